@@ -1,0 +1,1 @@
+"""Videos in, a weight per video out: finds incorrect demonstrations without labels."""

@@ -1,0 +1,1 @@
+"""From the frames of a segment to a short feature vector."""

@@ -1,0 +1,174 @@
+"""What a filter leaves behind: weight table, lists for other tools, record of the run, the page."""
+
+import json
+import platform
+import shlex
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from filtering.demo_filter import DemoFilter
+from filtering.report import ReportSection, render_report
+from filtering.report.views import demo_views
+from teasim.errors import ConfigError, TeasimError
+from teasim.pool import Pool
+from teasim.pool.files import write_json, write_text
+from teasim.pool.weight_table import write_weight_table
+
+FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
+"""What an output folder holds."""
+PACKAGES = ("teasim", "numpy", "scipy", "torch", "opencv-python-headless")
+"""Packages whose versions are written down, because weights may depend on them."""
+
+
+def check_output(out: Path, source: Path, *, overwrite: bool) -> None:
+    """Refuse an output folder that is in use, before any work is done.
+
+    Raises:
+        ConfigError: `out` is a file, lies in the pool, or holds something else, or an earlier
+            filter's output and `overwrite` is not set.
+    """
+    if out.resolve().is_relative_to(source.resolve()):
+        raise ConfigError(
+            f"The output '{out}' lies in the pool '{source}', which is never modified; "
+            "choose another folder."
+        )
+    if not out.exists():
+        return
+    if not out.is_dir():
+        raise ConfigError(f"The output '{out}' is a file; choose a folder.")
+    present = {path.name for path in out.iterdir()}
+    foreign = sorted(present - set(FILES))
+    if foreign:
+        raise ConfigError(
+            f"The output folder '{out}' holds other files ('{foreign[0]}'); "
+            "choose one that is new or empty."
+        )
+    if present and not overwrite:
+        raise ConfigError(
+            f"The output folder '{out}' holds an earlier filter's output; "
+            "choose another one or say --overwrite."
+        )
+
+
+def write_filter_output(
+    out: Path | str,
+    pool: Pool,
+    fitted: DemoFilter,
+    *,
+    sections: Sequence[ReportSection] = (),
+    overwrite: bool = False,
+) -> None:
+    """Write FILES to the folder `out`, each atomically, the page last.
+
+    Args:
+        out: new or empty folder, or one with an earlier output.
+        pool: what was filtered; it is not modified.
+        fitted: the filter after `fit(pool)`.
+        sections: what else goes on the page.
+        overwrite: replace an earlier filter's output.
+
+    Raises:
+        ConfigError: the folder is in use.
+        TeasimError: the folder cannot be written.
+    """
+    folder = Path(out)
+    check_output(folder, pool.root, overwrite=overwrite)
+    rows = fitted.table()
+    keep = [row.episode_index for row in rows if not row.flagged]
+    exclude = [row.episode_index for row in rows if row.flagged]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_weight_table(folder / "weights.csv", rows)
+        write_json(folder / "filter.json", run_record(fitted, pool))
+        write_text(folder / "keep.txt", keep_list(pool, keep))
+        write_text(folder / "exclude.txt", exclude_list(pool, exclude))
+    except OSError as error:
+        raise TeasimError(f"The output '{out}' cannot be written: {error.strerror}.") from error
+    render_report(
+        folder / "report.html",
+        demos=demo_views(pool, fitted),
+        threshold=fitted.threshold_,
+        subtasks=fitted.segments_.subtasks,
+        sections=sections,
+    )
+
+
+def run_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any]:
+    """Return what filter.json holds: enough to repeat the run and to check its result."""
+    return {
+        "config": asdict(fitted.config),
+        "pool": str(pool.root),
+        "pool_hash": pool.content_hash(),
+        "versions": _versions(),
+        "cameras": list(fitted.cameras_),
+        "subtasks": list(fitted.segments_.subtasks),
+        "demonstrations": len(fitted.weights_),
+        "flagged": int(fitted.flagged_.sum()),
+        "groups": int(fitted.groups_.max()) + 1,
+        "threshold": fitted.threshold_,
+        "objective": fitted.objective_,
+        "trusted": fitted.trusted_,
+        "trust": {
+            row.demo_id: float(w) for row, w in zip(fitted.table(), fitted.trust_, strict=True)
+        },
+        "seconds": {stage: round(spent, 3) for stage, spent in fitted.timings_.items()},
+    }
+
+
+def keep_list(pool: Pool, keep: Sequence[int]) -> str:
+    """Return keep.txt: the kept episodes, and how to use only them."""
+    indexes = _json(keep)
+    root, name = shlex.quote(str(pool.root)), shlex.quote(f"local/{pool.root.name}")
+    demos = " ".join(f"demo_{index}" for index in keep)
+    return _list(
+        keep,
+        f"{len(keep)} demonstrations to keep, episode indexes of {pool.root}",
+        f"LeRobot:   lerobot-train --dataset.repo_id={name} --dataset.root={root} "
+        f'--dataset.episodes="{indexes}"',
+        f"robomimic: put these names into mask/keep and set train.hdf5_filter_key=keep: {demos}",
+        f"Minari:    dataset.filter_episodes(lambda episode: episode.id in {indexes})",
+    )
+
+
+def exclude_list(pool: Pool, exclude: Sequence[int]) -> str:
+    """Return exclude.txt: the flagged episodes, and how to leave them out."""
+    title = f"{len(exclude)} demonstrations to leave out, episode indexes of {pool.root}"
+    if not exclude:
+        return _list(exclude, title)
+    indexes = _json(exclude)
+    root, name = shlex.quote(str(pool.root)), shlex.quote(f"local/{pool.root.name}")
+    demos = " ".join(f"demo_{index}" for index in exclude)
+    copy = shlex.quote(f"local/{pool.root.name}_filtered")
+    return _list(
+        exclude,
+        title,
+        f"LeRobot:   lerobot-train --dataset.repo_id={name} --dataset.root={root} "
+        f'--dataset.exclude_episodes="{indexes}"   (needs a version after 0.6.1)',
+        f"LeRobot:   lerobot-edit-dataset --repo_id {name} --root {root} --new_repo_id {copy} "
+        f'--operation.type delete_episodes --operation.episode_indices "{indexes}"   '
+        "(makes a copy, without the columns teasim/*)",
+        f"robomimic: leave these names out of the mask you train on: {demos}",
+        f"Minari:    dataset.filter_episodes(lambda episode: episode.id not in {indexes})",
+    )
+
+
+def _list(indexes: Sequence[int], *comments: str) -> str:
+    lines = [f"# {comment}" for comment in comments]
+    return "\n".join([*lines, *map(str, indexes)]) + "\n"
+
+
+def _json(indexes: Sequence[int]) -> str:
+    return json.dumps(list(indexes), separators=(",", ":"))
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found

@@ -1,0 +1,5 @@
+"""The page that shows every video beside its weight."""
+
+from filtering.report.page import DemoView, Mark, ReportSection, Segment, render_report
+
+__all__ = ["DemoView", "Mark", "ReportSection", "Segment", "render_report"]

@@ -1,0 +1,62 @@
+"""Where things go on the page: dots of the strip plot, marks above a timeline."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+DOT_WIDTH = 0.022
+"""Width of a dot [weight]; dots closer than that are stacked."""
+MARK_WIDTH = 22.0
+"""Room that the text of a mark takes [% of the timeline]."""
+
+
+@dataclass(frozen=True)
+class Dot:
+    """A demonstration in the strip plot."""
+
+    x: float
+    """Its weight."""
+    level: int
+    """Height in the stack, 0 is the lowest."""
+
+
+class _HasPlace(Protocol):
+    @property
+    def second(self) -> float:
+        """Where it is [s]."""
+
+
+@dataclass(frozen=True)
+class PlacedMark:
+    """A mark with its place above the timeline."""
+
+    left: float
+    """Distance from the left end [% of the longest video]."""
+    level: int
+    """Line of its text, 0 is the closest to the timeline."""
+    mark: _HasPlace
+    """The mark."""
+    turned: bool
+    """Whether the text stands left of the place, because there is no room on its right."""
+
+
+def place_dots(weights: Sequence[float]) -> list[Dot]:
+    """Stack dots that would overlap; the order of `weights` is kept."""
+    placed: list[Dot] = []
+    for weight in weights:
+        taken = {dot.level for dot in placed if abs(dot.x - weight) < DOT_WIDTH}
+        level = next(number for number in range(len(taken) + 1) if number not in taken)
+        placed.append(Dot(weight, level))
+    return placed
+
+
+def place_marks(marks: Sequence[_HasPlace], longest: float) -> list[PlacedMark]:
+    """Put the texts of marks on lines so that they do not overlap."""
+    placed: list[PlacedMark] = []
+    for mark in sorted(marks, key=lambda item: item.second):
+        left = 100.0 * mark.second / longest
+        turned = left > 100.0 - MARK_WIDTH
+        taken = {other.level for other in placed if abs(other.left - left) < 2 * MARK_WIDTH}
+        level = next(number for number in range(len(taken) + 1) if number not in taken)
+        placed.append(PlacedMark(left, level, mark, turned))
+    return placed

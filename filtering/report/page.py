@@ -1,0 +1,171 @@
+"""A self-contained HTML page: no file beside it, no network."""
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from filtering.report.layout import Dot, place_dots, place_marks
+from teasim.errors import TeasimError
+from teasim.pool.files import write_text
+
+PALETTE = (
+    "#d9822b",
+    "#4c86c6",
+    "#c9b458",
+    "#8d7bb8",
+    "#5a9e6f",
+    "#b86b8f",
+    "#5b6770",
+    "#9a6b4f",
+    "#3fa7a0",
+    "#7d8f3a",
+)
+"""Colours of the sub-tasks in their order; used again from the start when there are more."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A coloured stretch of a timeline."""
+
+    subtask: str
+    """Its name."""
+    start: float
+    """Where it starts [s]."""
+    stop: float
+    """Where it stops [s]."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A strange place on a timeline."""
+
+    second: float
+    """Where it is [s]."""
+    text: str
+    """What is strange there, in two to four words."""
+
+
+@dataclass(frozen=True)
+class DemoView:
+    """What the page says about one demonstration."""
+
+    episode_index: int
+    """Its number in the pool."""
+    demo_id: str
+    """Its identity."""
+    weight: float
+    """Weight in [0, 1]."""
+    loss: float
+    """Surprise [nats]."""
+    flagged: bool
+    """Whether it is called incorrect."""
+    group: int
+    """Its group, 0 is the best."""
+    reason: str
+    """One sentence, empty for a kept demonstration."""
+    seconds: float
+    """Length of the video [s]."""
+    segments: tuple[Segment, ...]
+    """Its timeline."""
+    marks: tuple[Mark, ...] = ()
+    """Strange places."""
+    video: bytes | None = None
+    """The mp4 that is shown, None for none."""
+
+
+@dataclass(frozen=True)
+class ReportSection:
+    """A part of the page that another package adds at its end."""
+
+    title: str
+    """Heading."""
+    html: str
+    """Trusted HTML, put on the page as it is."""
+
+
+def render_report(
+    path: Path | str,
+    *,
+    demos: Sequence[DemoView],
+    threshold: float,
+    subtasks: Sequence[str] = (),
+    title: str = "Which demonstrations can be trusted?",
+    summary: str = "",
+    sections: Sequence[ReportSection] = (),
+) -> None:
+    """Write the page to `path`, atomically.
+
+    Args:
+        path: the HTML file, replaced if it is there.
+        demos: what is shown, in any order.
+        threshold: weight below which a demonstration is flagged, 0 when nothing is.
+        subtasks: names in the order of their colours; empty means as they occur.
+        title: heading of the page.
+        summary: a line under the heading; empty means the number of flagged videos.
+        sections: what other packages add.
+
+    Raises:
+        TeasimError: the file cannot be written.
+    """
+    names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
+    colours = {name: PALETTE[number % len(PALETTE)] for number, name in enumerate(names)}
+    ordered = sorted(demos, key=lambda demo: (demo.weight, demo.episode_index))
+    longest = max((demo.seconds for demo in demos), default=1.0) or 1.0
+    page = (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            title=title,
+            summary=summary or _count_flagged(demos),
+            demos=ordered,
+            threshold=threshold,
+            colours=colours,
+            longest=longest,
+            dots=_dots(ordered),
+            sections=sections,
+            place_marks=lambda marks: place_marks(marks, longest),
+        )
+    )
+    try:
+        write_text(Path(path), page)
+    except OSError as error:
+        raise TeasimError(f"The report '{path}' cannot be written: {error.strerror}.") from error
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("filtering.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["spoken"] = _spoken
+    environment.filters["data_url"] = _data_url
+    environment.filters["trusted"] = lambda html: Markup(html)  # noqa: S704
+    return environment
+
+
+def _spoken(text: str) -> str:
+    """Show sub-task names as words."""
+    return text.replace("_", " ")
+
+
+def _data_url(video: bytes) -> str:
+    return "data:video/mp4;base64," + base64.b64encode(video).decode("ascii")
+
+
+def _count_flagged(demos: Sequence[DemoView]) -> str:
+    flagged = sum(demo.flagged for demo in demos)
+    if not flagged:
+        return f"None of the {len(demos)} videos is flagged."
+    verb = "is" if flagged == 1 else "are"
+    return f"{flagged} of {len(demos)} videos {verb} flagged as incorrect."
+
+
+def _dots(demos: Sequence[DemoView]) -> list[tuple[DemoView, Dot]]:
+    return list(zip(demos, place_dots([demo.weight for demo in demos]), strict=True))

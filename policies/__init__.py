@@ -1,0 +1,1 @@
+"""Demonstrations in, policies and their scores out (the paper, section 4.3)."""

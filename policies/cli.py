@@ -1,0 +1,136 @@
+"""The verbs of this floor: train, evaluate, demo. Options only; the work is done elsewhere.
+
+Nothing heavy is imported before a verb's options were understood.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from teasim.parallel import default_jobs
+
+Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """Train a policy on a pool of demonstrations."""
+
+    pool: tyro.conf.Positional[Path]
+    """Folder of the pool."""
+    output: Output
+    """New folder for the policy."""
+    learner: str = "bc"
+    """Learner: bc."""
+    level: str = "subtask"
+    """What is chosen: subtask."""
+    weights: Path | None = None
+    """Weight table (weights.csv of `teasim filter`)."""
+    use: str | None = None
+    """How weights are used: discard (drop flagged demonstrations), weight, ignore; default: discard
+    when there is a weight table."""
+    observe: str = "auto"
+    """What the policy sees: pixels, pixels_agent_pos, or auto (joints where the pool logs them)."""
+    seed: int = 0
+    """Seed of the learner."""
+    jobs: int = default_jobs()
+    """Processes that read the pool."""
+
+
+@dataclass(frozen=True)
+class EvaluateOptions:
+    """Run a trained policy in the environment and score it."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of the policy."""
+    episodes: int = 50
+    """Episodes per mode (deterministic and sampled decisions)."""
+    seed: int = 1000
+    """Seed of the first episode."""
+    min_policy_accuracy: float | None = None
+    """Least policy accuracy [%] (strict, deterministic decisions); below it the exit code is 1."""
+    json: Path | None = None
+    """File for all scores and episodes."""
+    junit: Path | None = None
+    """File for a build server."""
+    video: Path | None = None
+    """Folder for what the policy saw, one frame per decision."""
+    env_id: str = "teasim:teasim/TeaMakingSubtasks-v0"
+    """Gymnasium id of the environment."""
+    max_actions: int = 14
+    """Actions after which an episode is cut off."""
+    jobs: int = default_jobs()
+    """Processes that play episodes."""
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """Do the main job, small, start to end: generate, filter, train, compare, report."""
+
+    output: Output
+    """New folder for the pool, the filter's findings, the policies and the report."""
+    seq1: int = 10
+    """Correct demonstrations (Seq_1)."""
+    seq3: int = 4
+    """Incorrect demonstrations (Seq_3)."""
+    episodes: int = 10
+    """Episodes per policy and mode."""
+    seed: int = 0
+    """Seed of everything that is random."""
+    jobs: int = default_jobs()
+    """Processes."""
+
+
+def train(argv: Sequence[str]) -> int:
+    """Train a policy on a pool of demonstrations."""
+    options = tyro.cli(TrainOptions, args=list(argv), prog="teasim train")
+    from policies.training import TrainConfig, train_policy
+
+    use = options.use or ("ignore" if options.weights is None else "discard")
+    config = TrainConfig(
+        options.learner, options.level, options.weights, use, options.observe, options.seed
+    )
+    print(train_policy(options.pool, options.output, config, jobs=options.jobs))
+    return 0
+
+
+def evaluate(argv: Sequence[str]) -> int:
+    """Run a trained policy in the environment and score it."""
+    options = tyro.cli(EvaluateOptions, args=list(argv), prog="teasim evaluate")
+    from policies.checkpoint import load_policy
+    from policies.evaluation import EvaluationConfig
+    from policies.evaluation import evaluate as try_policy
+    from policies.outputs import check_file
+    from policies.results import Bar, summary, write_junit, write_scores
+    from policies.rollout import EnvironmentConfig
+
+    bar = None if options.min_policy_accuracy is None else Bar(options.min_policy_accuracy)
+    check_file(options.json)
+    check_file(options.junit)
+    world = EnvironmentConfig(options.env_id, max_actions=options.max_actions)
+    config = EvaluationConfig(options.episodes, options.seed, world, options.video)
+    scores = try_policy(load_policy(options.run), config, jobs=options.jobs)
+    if options.json:
+        about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
+        write_scores(options.json, scores, about)
+    if options.junit:
+        write_junit(options.junit, scores, bar)
+    print(summary(scores))
+    if bar is None or bar.passed(scores):
+        return 0
+    print(f"policy accuracy is below {bar.percent:g} %")
+    return 1
+
+
+def demo(argv: Sequence[str]) -> int:
+    """Do the main job, small, start to end: generate, filter, train, compare, report."""
+    options = tyro.cli(DemoOptions, args=list(argv), prog="teasim demo")
+    from policies.experiments.demo import DemoConfig, run_demo
+
+    config = DemoConfig(options.seq1, options.seq3, options.episodes, options.seed)
+    print(run_demo(options.output, config, jobs=options.jobs))
+    return 0

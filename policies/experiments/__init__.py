@@ -1,0 +1,1 @@
+"""Filter, then train: the only room that sees the filter."""

@@ -1,0 +1,184 @@
+"""The main job, small, start to end: pool -> filter -> two policies -> scores -> report.
+
+The question (the paper, section 4.3): is a policy better when the demonstrations that the filter
+flags are left out? The labels of the pool are read for scoring the filter only.
+"""
+
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filtering.demo_filter import DemoFilter, FilterConfig, write_filter_output
+from numpy.typing import NDArray
+
+from filtering.report import ReportSection
+from policies.bc import BC, BCConfig
+from policies.checkpoint import save_policy
+from policies.demos import load_decisions
+from policies.evaluation import EvaluationConfig, Scores, evaluate
+from policies.experiments.score_section import score_section, sentences
+from policies.outputs import check_folder
+from policies.results import as_json
+from policies.results import summary as rates
+from policies.rollout import EnvironmentConfig
+from teasim.errors import ConfigError, GenerationError
+from teasim.pool import Pool
+from teasim.pool.files import write_json
+
+ALL = "all demonstrations"
+KEPT = "without the flagged"
+
+
+@dataclass(frozen=True)
+class DemoConfig:
+    """Size and seed of the demo; the defaults take about three minutes on two cores."""
+
+    seq1: int = 10
+    """Correct demonstrations (Seq_1)."""
+    seq3: int = 4
+    """Incorrect demonstrations (Seq_3)."""
+    episodes: int = 10
+    """Evaluation episodes per policy and mode."""
+    seed: int = 0
+    """Seed of the pool, the filter and the learner."""
+    frames_per_segment: int = 16
+    """Frames the filter looks at in each segment; fewer than its default, for speed."""
+    environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
+    """The world the policies are tried out in."""
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a pool without demonstrations to learn from."""
+        if self.seq1 < 1 or self.seq3 < 0:
+            raise ConfigError(
+                f"The demo needs one correct demonstration or more and no negative number, "
+                f"not --seq1 {self.seq1} --seq3 {self.seq3}."
+            )
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the demo found out."""
+
+    flagged: tuple[int, ...]
+    """Episodes the filter flagged."""
+    incorrect: tuple[int, ...]
+    """Episodes that are incorrect by their labels."""
+    scores: Mapping[str, Mapping[str, Scores]]
+    """Training set -> mode -> scores; one training set if the filter leaves none or all."""
+    seconds: Mapping[str, float]
+    """Wall time of each stage [s]."""
+
+
+class Stopwatch:
+    """Wall time of stages that follow one another."""
+
+    def __init__(self) -> None:
+        """Start now."""
+        self.seconds: dict[str, float] = {}
+        self._began = time.perf_counter()
+
+    def lap(self, stage: str) -> None:
+        """End `stage` and start the next."""
+        now = time.perf_counter()
+        self.seconds[stage] = round(now - self._began, 1)
+        self._began = now
+
+
+def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
+    """Do everything in the new folder `out` and return the summary to print.
+
+    Raises:
+        ConfigError: `out` is in use.
+        GenerationError: the pool could not be generated.
+    """
+    check_folder(out)
+    watch = Stopwatch()
+    pool = generate_pool(out / "pool", config, jobs)
+    watch.lap("generate")
+    settings = FilterConfig(frames_per_segment=config.frames_per_segment, seed=config.seed)
+    found = DemoFilter(settings).fit(pool, jobs=jobs)
+    watch.lap("filter")
+    scores = compare_policies(pool, found.flagged_, out, config, jobs)
+    watch.lap("policies")
+    findings = Findings(
+        tuple(e.index for e, flag in zip(pool.episodes, found.flagged_, strict=True) if flag),
+        tuple(e.index for e in pool.episodes if e.record is not None and not e.record.correct),
+        scores,
+        watch.seconds,
+    )
+    section = ReportSection("Policies", score_section(scores))
+    write_filter_output(out, pool, found, sections=[section])
+    write_json(out / "demo.json", as_record(findings, config))
+    return summary(findings, out)
+
+
+def generate_pool(path: Path, config: DemoConfig, jobs: int) -> Pool:
+    """Generate the pool with the command line, because policies never import the world.
+
+    Raises:
+        GenerationError: the command failed; its own sentence is on stderr.
+    """
+    command = [sys.executable, "-m", "teasim", "generate", str(path)]
+    numbers = {"seq1": config.seq1, "seq3": config.seq3, "seed": config.seed, "jobs": jobs}
+    for name, number in numbers.items():
+        command += [f"--{name}", str(number)]
+    code = subprocess.run(command, check=False).returncode
+    if code != 0:
+        raise GenerationError(f"The pool '{path}' could not be generated (exit code {code}).")
+    return Pool.open(path)
+
+
+def compare_policies(
+    pool: Pool, flagged: NDArray[np.bool_], out: Path, config: DemoConfig, jobs: int
+) -> dict[str, dict[str, Scores]]:
+    """Clone behaviour from all of `pool` and from what is not flagged, (D,), and try both out."""
+    sets = {ALL: np.ones(len(flagged))}
+    if flagged.any() and not flagged.all():
+        sets[KEPT] = (~flagged).astype(float)
+    samples = load_decisions(pool, jobs=jobs)
+    trial = EvaluationConfig(episodes=config.episodes, environment=config.environment)
+    scores = {}
+    for name, weights in sets.items():
+        settings = BCConfig(seed=config.seed)
+        policy = BC(settings).fit(samples, weights).policy_
+        training = {"learner": "bc", "settings": asdict(settings), "demo_weights": list(weights)}
+        save_policy(policy, out / "policies" / name.replace(" ", "_"), training=training)
+        scores[name] = evaluate(policy, trial, jobs=jobs)
+    return scores
+
+
+def as_record(findings: Findings, config: DemoConfig) -> dict[str, Any]:
+    """Everything that was found, as JSON can hold it."""
+    return {
+        "version": version("teasim"),
+        "config": asdict(config),
+        "flagged": findings.flagged,
+        "incorrect": findings.incorrect,
+        "scores": {name: as_json(by_mode) for name, by_mode in findings.scores.items()},
+        "seconds": findings.seconds,
+    }
+
+
+def summary(findings: Findings, out: Path) -> str:
+    """Say in a few lines what was found and where to read on."""
+    missed = sorted(set(findings.incorrect) - set(findings.flagged))
+    wrong = sorted(set(findings.flagged) - set(findings.incorrect))
+    lines = [
+        f"flagged:    {_listed(findings.flagged)}",
+        f"incorrect:  {_listed(findings.incorrect)}   (by the labels of the pool)",
+        f"missed:     {_listed(missed)}   falsely flagged: {_listed(wrong)}",
+        *(f"policy on {name}:\n{rates(by_mode)}" for name, by_mode in findings.scores.items()),
+        *sentences(findings.scores),
+        f"report:     {out / 'report.html'}",
+    ]
+    return "\n".join(lines)
+
+
+def _listed(episodes: tuple[int, ...] | list[int]) -> str:
+    return ", ".join(map(str, episodes)) or "none"

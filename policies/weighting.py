@@ -1,0 +1,97 @@
+"""The one place where the weight of a demonstration meets a loss.
+
+The law every learner keeps: weight 0 equals the demonstration removed, weight 2 equals it twice.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from policies.base import DecisionSamples
+from teasim.errors import ConfigError
+from teasim.pool import Pool
+from teasim.pool.weight_table import WeightRow, read_weight_table
+
+USES = ("discard", "weight", "ignore")
+"""`discard` drops flagged demonstrations, `weight` takes each at its weight, `ignore` takes all."""
+
+
+def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64]:
+    """Weight of every demonstration of `pool`, (D,); ones without a table.
+
+    Rows are matched by `demo_id`, so a pool whose episodes were re-numbered still fits its table.
+
+    Raises:
+        ConfigError: `use` is unknown, or the table belongs to another pool, or every weight is 0.
+        PoolError: the table cannot be read.
+    """
+    if use not in USES:
+        raise ConfigError(f"Unknown use '{use}' of weights; choose {', '.join(USES)}.")
+    if table is None:
+        return np.ones(len(pool.episodes))
+    rows = {row.demo_id: row for row in read_weight_table(table)}
+    missing = [episode for episode in pool.episodes if episode.demo_id not in rows]
+    if len(missing) == len(pool.episodes):
+        raise ConfigError(
+            f"The weight table '{table}' is for another pool: "
+            f"it has no demonstration of '{pool.root}'."
+        )
+    if missing:
+        raise ConfigError(
+            f"The weight table '{table}' lacks {len(missing)} of the {len(pool.episodes)} "
+            f"demonstrations of '{pool.root}', the first is episode {missing[0].index}."
+        )
+    weights = np.array([_weight(rows[episode.demo_id], use) for episode in pool.episodes])
+    if not weights.any():
+        raise ConfigError(
+            f"With use '{use}' the weight table '{table}' leaves no demonstration to learn from; "
+            f"choose another use ({', '.join(USES)})."
+        )
+    return weights
+
+
+def _weight(row: WeightRow, use: str) -> float:
+    if use == "discard":
+        return 0.0 if row.flagged else 1.0
+    return float(row.weight) if use == "weight" else 1.0
+
+
+def weigh(
+    samples: DecisionSamples, weights: NDArray[np.float64]
+) -> tuple[DecisionSamples, NDArray[np.float64]]:
+    """Return the samples that count and the share of the total each one has, (n,) summing to 1.
+
+    Args:
+        samples: decisions of a pool of D demonstrations.
+        weights: weight per demonstration, (D,), not negative.
+
+    Raises:
+        ConfigError: a weight is missing, negative or not finite, or none is positive.
+    """
+    if len(samples.demos) and samples.demos.max() >= len(weights):
+        raise ConfigError(
+            f"{len(weights)} weights do not cover demonstration {samples.demos.max()} of the pool."
+        )
+    if not np.isfinite(weights).all() or (weights < 0).any():
+        raise ConfigError("A demonstration weight is negative or not a number.")
+    each = weights[samples.demos] * samples.shares
+    if not each.any():
+        raise ConfigError("Every demonstration has weight 0, so there is nothing to learn from.")
+    counts = each > 0
+    return samples.take(counts), each[counts] / each.sum()
+
+
+def weighted_loss(losses: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
+    """Mean of `losses` (n,) under `weights` (n,) that sum to 1, as `weigh` returns them."""
+    return (losses * weights).sum()
+
+
+def weighted_moments(
+    values: NDArray[np.float32], weights: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean and standard deviation (F,) of `values` (n, F) under `weights` (n,) that sum to 1."""
+    mean = weights @ values.astype(np.float64)
+    variance = weights @ (values - mean) ** 2
+    return mean, np.sqrt(variance)

@@ -1,0 +1,201 @@
+"""The verb `doctor`: can this machine render and make videos, how fast, and what would mend it."""
+
+import json
+import os
+import platform
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from teasim.gl import BACKENDS, FIXES, Probe, probe
+from teasim.parallel import default_jobs
+
+PACKAGES = (
+    "teasim",
+    "mujoco",
+    "gymnasium",
+    "numpy",
+    "scipy",
+    "torch",
+    "opencv-python-headless",
+    "imageio-ffmpeg",
+    "av",
+    "pyarrow",
+    "mink",
+)
+
+_SIDE = 224  # pixels
+_FRAMES = 50
+_FPS = 10
+_LARGEST_MEAN_ERROR = 8.0  # grey levels of 255; crf 20 stays far below on a smooth picture
+
+
+@dataclass(frozen=True)
+class Doctor:
+    """Options of the verb."""
+
+    json: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Print one JSON object instead of text."""
+
+
+@dataclass(frozen=True)
+class VideoProbe:
+    """What came of writing a short h264 video and reading it back."""
+
+    ok: bool
+    """Whether all frames came back, looking the same."""
+    ms_per_frame: float | None
+    """Wall milliseconds per 224x224 frame, encoding and decoding, or None on failure."""
+    problem: str | None
+    """What went wrong in a few words, or None."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that the doctor found out."""
+
+    ok: bool
+    """Whether rendering and video both work."""
+    python: str
+    """Version of the interpreter."""
+    system: str
+    """Operating system and processor type."""
+    cpus: int
+    """Cores this process may use."""
+    gl: str | None
+    """The back end that would be used, or None where none renders."""
+    rendering: tuple[Probe, ...]
+    """One entry per back end."""
+    video: VideoProbe
+    """h264 there and back."""
+    packages: dict[str, str | None]
+    """Version of each package that matters for repeating a result; None where it is missing."""
+    fixes: tuple[str, ...]
+    """Commands that mend what is missing; empty when `ok`."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Check that this machine can render and make videos, and print what would mend it."""
+    options = tyro.cli(Doctor, args=arguments, prog="teasim doctor", description=main.__doc__)
+    report = examine()
+    print(json.dumps(asdict(report), indent=2) if options.json else _text(report))
+    return 0 if report.ok else 1
+
+
+def examine() -> Report:
+    """Render with every back end, write and read a video, and collect the versions."""
+    wish = os.environ.get("MUJOCO_GL", "").strip().lower()
+    names = BACKENDS if wish in ("", *BACKENDS) else (wish, *BACKENDS)
+    rendering = tuple(probe(name) for name in names)
+    working = [p.backend for p in rendering if p.ok and wish in ("", p.backend)]
+    video = probe_video()
+    packages = {name: _version(name) for name in PACKAGES}
+    return Report(
+        ok=bool(working) and video.ok,
+        python=platform.python_version(),
+        system=f"{platform.system()} {platform.machine()}",
+        cpus=default_jobs(),
+        gl=working[0] if working else None,
+        rendering=rendering,
+        video=video,
+        packages=packages,
+        fixes=_fixes(wish, bool(working), video.ok),
+    )
+
+
+def probe_video() -> VideoProbe:
+    """Encode a moving gradient as h264 with imageio-ffmpeg and decode it with OpenCV."""
+    frames = _gradient()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "probe.mp4"
+        try:
+            import cv2  # noqa: F401  (loaded here so that the clock does not see it)
+            import imageio_ffmpeg  # noqa: F401
+
+            start = time.perf_counter()
+            _encode(path, frames)
+            decoded = _decode(path)
+        except Exception as error:  # whatever a codec or its binary may throw is the finding
+            return VideoProbe(False, None, f"{type(error).__name__}: {error}")
+        seconds = time.perf_counter() - start
+    if decoded.shape != frames.shape:
+        return VideoProbe(False, None, f"{len(decoded)} of {len(frames)} frames came back")
+    change = float(np.abs(decoded.astype(np.int16) - frames).mean())
+    if change > _LARGEST_MEAN_ERROR:
+        return VideoProbe(False, None, f"the picture changed by {change:.0f} of 255 grey levels")
+    return VideoProbe(True, round(1000 * seconds / len(frames), 2), None)
+
+
+def _gradient() -> np.ndarray:
+    """Smooth moving RGB pictures, (frames, 224, 224, 3) uint8."""
+    row, column = np.mgrid[0:_SIDE, 0:_SIDE]
+    shift = 2 * np.arange(_FRAMES)[:, None, None]
+    red = (row + shift) % 256 * 0.5
+    blue = np.broadcast_to(column * 0.5, red.shape)
+    return np.stack([red, np.full_like(red, 90.0), blue], axis=-1).astype(np.uint8)
+
+
+def _encode(path: Path, frames: np.ndarray) -> None:
+    import imageio_ffmpeg
+
+    writer = imageio_ffmpeg.write_frames(
+        str(path), (_SIDE, _SIDE), fps=_FPS, codec="libx264", output_params=["-threads", "1"]
+    )
+    writer.send(None)
+    for frame in frames:
+        writer.send(np.ascontiguousarray(frame))
+    writer.close()
+
+
+def _decode(path: Path) -> np.ndarray:
+    import cv2
+
+    capture, frames = cv2.VideoCapture(str(path)), []
+    while (answer := capture.read())[0]:
+        frames.append(cv2.cvtColor(answer[1], cv2.COLOR_BGR2RGB))
+    capture.release()
+    return np.stack(frames) if frames else np.empty((0, _SIDE, _SIDE, 3), np.uint8)
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _fixes(wish: str, renders: bool, makes_videos: bool) -> tuple[str, ...]:
+    fixes = []
+    if not renders and wish not in ("", *BACKENDS):
+        fixes.append("unset MUJOCO_GL")
+    elif not renders:
+        fixes.append(FIXES[wish or "egl"])
+    if not makes_videos:
+        fixes.append("pip install --force-reinstall imageio-ffmpeg opencv-python-headless")
+    return tuple(fixes)
+
+
+def _text(report: Report) -> str:
+    lines = [f"Python {report.python}, {report.system}, {report.cpus} cores", "", "rendering"]
+    for result in report.rendering:
+        used = "  (in use)" if result.backend == report.gl else ""
+        outcome = f"{result.ms_per_frame} ms per 224x224 frame" if result.ok else result.problem
+        lines.append(f"  {_mark(result.ok)}  {result.backend:<7} {outcome}{used}")
+    video = report.video
+    outcome = f"{video.ms_per_frame} ms per 224x224 frame, both ways" if video.ok else video.problem
+    lines += ["video", f"  {_mark(video.ok)}  {'h264':<7} {outcome}", "packages"]
+    lines += [f"  {name:<24} {found or 'missing'}" for name, found in report.packages.items()]
+    lines += ["", *(f"To mend it, run: {fix}" for fix in report.fixes)]
+    if report.ok:
+        lines.append("All well: rendering and video work.")
+    return "\n".join(lines)
+
+
+def _mark(ok: bool) -> str:
+    return "ok" if ok else "--"

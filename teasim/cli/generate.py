@@ -1,0 +1,86 @@
+"""The verb `generate`: render a pool of demonstrations."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from teasim.errors import ConfigError
+from teasim.parallel import default_jobs
+
+
+@dataclass(frozen=True)
+class GenerateArguments:
+    """Render a pool of tea-making demonstrations, with mistakes in it when asked for."""
+
+    pool: Annotated[Path, tyro.conf.Positional]
+    """Folder to write; new or empty. An interrupted pool is continued by the same command."""
+    seq1: int = 10
+    """Demonstrations in the optimal order."""
+    seq2: int = 0
+    """Demonstrations in the sub-optimal order (tea bag late)."""
+    seq3: int = 0
+    """Incorrect demonstrations: one or two of tea bag, water and oven-off left out."""
+    mistakes: tuple[str, ...] = ()
+    """Further incorrect demonstrations, as NAME or NAME:COUNT."""
+    cameras: tuple[str, ...] = ("left", "cup")
+    """Cameras that film: left, cup, front, top."""
+    size: int = 224
+    """Width and height of the videos in pixels."""
+    quality: str = "fast"
+    """Look of the pictures: fast or nice."""
+    seed: int = 0
+    """Seed of everything random; the same seed gives the same files."""
+    jobs: int = default_jobs()
+    """Processes to work in; the result does not depend on it."""
+    backend: str = "loky"
+    """What runs the processes: loky, dask or ray."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Render a pool of tea-making demonstrations, with mistakes in it when asked for."""
+    arguments = tyro.cli(GenerateArguments, prog="teasim generate", args=argv)
+    mistakes = parse_mistakes(arguments.mistakes)
+    from teasim.generate import GenerateConfig, generate
+
+    config = GenerateConfig(
+        seq1=arguments.seq1,
+        seq2=arguments.seq2,
+        seq3=arguments.seq3,
+        mistakes=mistakes,
+        cameras=arguments.cameras,
+        size=arguments.size,
+        quality=arguments.quality,
+        seed=arguments.seed,
+    )
+    start = time.perf_counter()
+    made = generate(arguments.pool, config, jobs=arguments.jobs, backend=arguments.backend)
+    seconds = time.perf_counter() - start
+    count = len(made.pool.episodes)
+    print(
+        f"{count} demonstrations in {arguments.pool} ({seconds:.0f} s, "
+        f"{made.remade} made again because they did not come out as labelled)"
+    )
+    return 0
+
+
+def parse_mistakes(words: Sequence[str]) -> tuple[tuple[str, int], ...]:
+    """Turn NAME and NAME:COUNT into counts.
+
+    Raises:
+        ConfigError: a count is not a number, or a name is given twice.
+    """
+    counts: dict[str, int] = {}
+    for word in words:
+        name, _, count = word.partition(":")
+        if name in counts:
+            raise ConfigError(f"The mistake '{name}' is given twice; write it once as NAME:COUNT.")
+        if count and not count.isdigit():
+            raise ConfigError(f"'{word}' is no mistake with a count; write NAME or NAME:COUNT.")
+        counts[name] = int(count or 1)
+    return tuple(counts.items())

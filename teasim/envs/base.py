@@ -1,0 +1,118 @@
+"""What both environments share: the station, how it is reset, seen and judged."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+
+from teasim.constants import FPS, SUBTASKS
+from teasim.envs.observations import observation_space, observe
+from teasim.errors import ConfigError
+from teasim.render import StationRenderer, check_cameras
+from teasim.task.recipes import allowed_next, next_correct
+from teasim.task.scoring import Verdict, judge
+from teasim.world.simulation import Simulation
+from teasim.world.station import nominal_layout, sample_layout
+
+RENDER_SIZE = (480, 640)
+"""Height and width of `render()` when the observations hold no pictures [pixels]."""
+
+
+class StationEnv(gymnasium.Env[dict[str, Any], Any]):
+    """The tea-making station; subclasses say what an action is."""
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": FPS}
+
+    def __init__(
+        self,
+        obs_type: str = "state",
+        cameras: Sequence[str] = ("left", "cup"),
+        width: int = 224,
+        height: int = 224,
+        render_mode: str | None = None,
+        quality: str = "fast",
+        randomize: bool = True,
+    ) -> None:
+        """Build the station; OpenGL starts with the first picture.
+
+        Args:
+            obs_type: state, pixels or pixels_agent_pos.
+            cameras: Cameras of the `pixels` observation; the first one is the one of `render()`.
+            width: Width of the pictures [pixels].
+            height: Height of the pictures [pixels].
+            render_mode: None or rgb_array.
+            quality: Look of the pictures, fast or nice.
+            randomize: Move and turn the things on the table at every reset.
+
+        Raises:
+            ConfigError: an argument is unknown or out of range.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ConfigError(f"Unknown render_mode '{render_mode}'; choose None or rgb_array.")
+        self.render_mode = render_mode
+        self._cameras = check_cameras(cameras)
+        self._size = (height, width)
+        self._quality = quality
+        self._randomize = randomize
+        self.observation_space = observation_space(obs_type, self._cameras, height, width)
+        self._simulation = Simulation()
+        self._renderer: StationRenderer | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Start a new episode: everything in place, both arms at READY."""
+        super().reset(seed=seed)
+        layout = sample_layout(self.np_random) if self._randomize else nominal_layout()
+        self._simulation.reset(layout)
+        return self._observation(), self._info(self._verdict())
+
+    def render(self) -> Any:
+        """Picture (height, width, 3) uint8 of the first camera, or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return self._pictures().frames(self._cameras[:1])[self._cameras[0]]
+
+    def close(self) -> None:
+        """Close OpenGL."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _pictures(self) -> StationRenderer:
+        if self._renderer is None:
+            height, width = self._size
+            self._renderer = StationRenderer(
+                self._simulation, width=width, height=height, quality=self._quality
+            )
+        return self._renderer
+
+    def _observation(self) -> dict[str, Any]:
+        seeing = "pixels" in self.observation_space.spaces  # type: ignore[attr-defined]
+        renderer = self._pictures() if seeing else None
+        space: Any = self.observation_space
+        return observe(space, self._simulation, renderer, self._cameras)
+
+    def _verdict(self) -> Verdict:
+        simulation = self._simulation
+        return judge(
+            simulation.subtasks_done,
+            oven_on=simulation.oven_on,
+            spilled=simulation.liquids.spilled,
+        )
+
+    def _info(self, verdict: Verdict) -> dict[str, Any]:
+        done = self._simulation.subtasks_done
+        following = next_correct(done)
+        return {
+            "success": verdict.success,
+            "is_success": verdict.success,
+            "subtasks": SUBTASKS,
+            "subtasks_done": done,
+            "correct_action": -1 if following is None else SUBTASKS.index(following),
+            "allowed_actions": tuple(SUBTASKS.index(name) for name in allowed_next(done)),
+            "violations": verdict.violations,
+            "unsafe": verdict.unsafe,
+            "time": np.float64(self._simulation.data.time),
+        }

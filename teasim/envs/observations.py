@@ -1,0 +1,60 @@
+"""What an agent sees: joint state, environment state, camera pictures."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from teasim.constants import STATE_NAMES
+from teasim.errors import ConfigError
+from teasim.render import StationRenderer
+from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
+
+OBS_TYPES = ("state", "pixels", "pixels_agent_pos")
+LARGEST = 1000.0
+"""Bound of every state value: rad, m, ml and g all stay far below it."""
+
+
+def observation_space(
+    obs_type: str, cameras: tuple[str, ...], height: int, width: int
+) -> spaces.Dict:
+    """Space of the observations.
+
+    Raises:
+        ConfigError: unknown `obs_type`.
+    """
+    if obs_type not in OBS_TYPES:
+        raise ConfigError(f"Unknown obs_type '{obs_type}'; choose {', '.join(OBS_TYPES)}.")
+    parts: dict[str, spaces.Space[Any]] = {}
+    if obs_type != "pixels":
+        parts["agent_pos"] = _vector(len(STATE_NAMES))
+    if obs_type == "state":
+        parts["environment_state"] = _vector(len(ENVIRONMENT_STATE_NAMES))
+    else:
+        picture = spaces.Box(0, 255, (height, width, 3), np.uint8)
+        # As in PushT and ALOHA: one camera is a plain picture, several are a dict of pictures.
+        several = len(cameras) > 1
+        parts["pixels"] = spaces.Dict(dict.fromkeys(cameras, picture)) if several else picture
+    return spaces.Dict(parts)
+
+
+def observe(
+    space: spaces.Dict,
+    simulation: Simulation,
+    renderer: StationRenderer | None,
+    cameras: tuple[str, ...],
+) -> dict[str, Any]:
+    """The present observation, as `space` asks for it; every array is new."""
+    observation: dict[str, Any] = {}
+    if "agent_pos" in space.spaces:
+        observation["agent_pos"] = simulation.joint_state()
+    if "environment_state" in space.spaces:
+        observation["environment_state"] = simulation.environment_state()
+    if "pixels" in space.spaces and renderer is not None:
+        frames = renderer.frames(cameras)
+        observation["pixels"] = frames if len(cameras) > 1 else frames[cameras[0]]
+    return observation
+
+
+def _vector(size: int) -> spaces.Box:
+    return spaces.Box(-LARGEST, LARGEST, (size,), np.float32)

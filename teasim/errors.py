@@ -1,0 +1,29 @@
+"""Every error a user can cause: one sentence that names the culprit and the choices."""
+
+
+class TeasimError(Exception):
+    """Base of all errors the command line turns into one sentence and exit code 2."""
+
+
+class ConfigError(TeasimError):
+    """A setting is unknown, out of range, or contradicts another one."""
+
+
+class PoolError(TeasimError):
+    """A pool of demonstrations is missing, damaged, or not what its metadata says."""
+
+
+class RenderError(TeasimError):
+    """No headless OpenGL back end could be started."""
+
+
+class SkillError(TeasimError):
+    """A sub-task cannot be carried out from the present state of the station."""
+
+
+class GenerationError(TeasimError):
+    """A demonstration did not come out as its label says, however often it was made again."""
+
+
+class CheckpointError(TeasimError):
+    """A saved policy is missing, damaged, or was made for another observation or action space."""

@@ -1,0 +1,196 @@
+"""Headless OpenGL: the back end MuJoCo renders with, chosen lazily, never over the user's choice.
+
+EGL comes first (it finds a graphics card and falls back to the processor by itself), OSMesa second
+(the processor only). Both give identical frames on a machine without a graphics card.
+"""
+
+import ctypes
+import importlib
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from teasim.errors import RenderError
+
+BACKENDS = ("egl", "osmesa")
+USER_CHOICES = (*BACKENDS, "glfw", "glx")
+
+LIBRARIES = {"egl": ("libEGL.so.1", "libOpenGL.so.0"), "osmesa": ("libOSMesa.so.8",)}
+FIXES = {
+    "egl": "apt-get install libegl1 libgl1-mesa-dri libopengl0",
+    "osmesa": "apt-get install libosmesa6",
+}
+
+# Constants of the EGL registry (EGL_EXT_platform_device).
+_EGL_PLATFORM_DEVICE_EXT = 0x313F
+_MAX_DEVICES = 32
+
+_PROBE_SECONDS = 120.0  # a software renderer's first start on a busy machine is slow
+_PROBE_SCENE = """
+<mujoco>
+  <visual><quality shadowsize="0" offsamples="0"/></visual>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <geom type="plane" size="1 1 .1" rgba=".2 .4 .2 1"/>
+    <geom type="sphere" size=".3" pos="0 0 .3" rgba=".8 .2 .2 1"/>
+    <camera name="probe" pos="0 -2 1" xyaxes="1 0 0 0 .4 .9"/>
+  </worldbody>
+</mujoco>
+"""
+_PROBE_PROGRAM = """
+import sys, time
+import mujoco
+model = mujoco.MjModel.from_xml_string(sys.argv[1])
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+with mujoco.Renderer(model, 224, 224) as renderer:
+    for frame in range(21):
+        if frame == 1:
+            start = time.perf_counter()
+        renderer.update_scene(data, camera="probe")
+        pixels = renderer.render()
+    seconds = time.perf_counter() - start
+if pixels.std() < 1:
+    sys.exit("the picture came out blank")
+print(1000 * seconds / 20)
+"""
+
+
+def choose_gl() -> str:
+    """Make MuJoCo render without a display and return the back end's name; cheap to call again.
+
+    Sets the environment variable MUJOCO_GL, so that child processes inherit the choice. Call it
+    before the first `mujoco.Renderer`; it may come after `import mujoco`, which is then told.
+
+    Raises:
+        RenderError: MUJOCO_GL is set to something that cannot work, or no back end's library loads.
+    """
+    wish = os.environ.get("MUJOCO_GL", "").strip().lower()
+    if platform.system() != "Linux":  # elsewhere MuJoCo's own default renders off screen
+        return wish or "default"
+    if wish and wish not in USER_CHOICES:
+        raise RenderError(
+            f"MUJOCO_GL is '{wish}', which cannot render; unset it or choose "
+            f"{', '.join(USER_CHOICES)}."
+        )
+    if wish in ("glfw", "glx"):
+        return wish
+    problems = []
+    for backend in (wish,) if wish else BACKENDS:
+        problem = find_problem(backend)
+        if problem is None:
+            _tell_mujoco(backend)
+            return backend
+        problems.append(f"{backend}: {problem}")
+    raise RenderError(
+        f"No headless OpenGL back end works ({'; '.join(problems)}); "
+        f"run '{FIXES[wish or 'egl']}' and try again."
+    )
+
+
+def find_problem(backend: str) -> str | None:
+    """Say what keeps `backend` (one of `BACKENDS`) from working, or None; without MuJoCo."""
+    for name in LIBRARIES[backend]:
+        if _load(name) is None:
+            return f"{name} is missing"
+    if backend == "egl" and not _egl_device_starts():
+        return "libEGL.so.1 finds no device that starts"
+    return None
+
+
+def _tell_mujoco(backend: str) -> None:
+    if os.environ.get("MUJOCO_GL", "").strip().lower() == backend:
+        return
+    os.environ["MUJOCO_GL"] = backend
+    # MuJoCo reads the variable when it is imported, so an earlier import has to look again.
+    for name in ("mujoco.rendering.classic.gl_context", "mujoco.gl_context"):
+        if name in sys.modules:
+            importlib.reload(sys.modules[name])
+
+
+def _load(name: str) -> ctypes.CDLL | None:
+    try:
+        return ctypes.CDLL(name)
+    except OSError:
+        return None
+
+
+def _egl_device_starts() -> bool:
+    """Whether EGL can initialise one of its devices: the library without a driver cannot."""
+    egl = ctypes.CDLL("libEGL.so.1")
+    egl.eglGetProcAddress.restype = ctypes.c_void_p
+    pointer, integer = ctypes.c_void_p, ctypes.c_int
+
+    def function(name: bytes, result: Any, *arguments: Any) -> Callable[..., Any]:
+        address = egl.eglGetProcAddress(name)
+        if not address:
+            return lambda *_: None  # an EGL without this extension: no device will be found
+        prototype = ctypes.CFUNCTYPE(result, *arguments)
+        return prototype(address)
+
+    query = function(b"eglQueryDevicesEXT", integer, integer, pointer, pointer)
+    display_of = function(b"eglGetPlatformDisplayEXT", pointer, integer, pointer, pointer)
+    initialize = function(b"eglInitialize", integer, pointer, pointer, pointer)
+    devices, found = (pointer * _MAX_DEVICES)(), integer(0)
+    query(_MAX_DEVICES, devices, ctypes.byref(found))
+    displays = (display_of(_EGL_PLATFORM_DEVICE_EXT, devices[i], None) for i in range(found.value))
+    return any(display and initialize(display, None, None) for display in displays)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What came of rendering a small scene with one back end in a process of its own."""
+
+    backend: str
+    """Name as in MUJOCO_GL."""
+    ok: bool
+    """Whether a picture came out that is not blank."""
+    ms_per_frame: float | None
+    """Wall milliseconds per 224x224 frame, or None where nothing was rendered."""
+    problem: str | None
+    """What went wrong in a few words, or None."""
+
+
+def probe(backend: str) -> Probe:
+    """Render a small scene with `backend` in a child process, whatever this process has chosen."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYOPENGL_PLATFORM"}
+    environment["MUJOCO_GL"] = backend
+    try:
+        child = subprocess.run(
+            [sys.executable, "-c", _PROBE_PROGRAM, _PROBE_SCENE],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=_PROBE_SECONDS,
+        )
+    except subprocess.TimeoutExpired:
+        return Probe(backend, False, None, f"no picture within {_PROBE_SECONDS:.0f} s")
+    if child.returncode == 0:
+        return Probe(backend, True, round(float(child.stdout), 2), None)
+    # The libraries' own message is obscure when one is missing, so the plain reason goes first.
+    last = (child.stderr.strip().splitlines() or [f"exit code {child.returncode}"])[-1]
+    reason = find_problem(backend) if backend in BACKENDS else None
+    return Probe(backend, False, None, reason or last)
+
+
+def first_working() -> Probe:
+    """Probe the user's choice (MUJOCO_GL) or else each back end in turn, up to one that works.
+
+    Raises:
+        RenderError: none of them renders.
+    """
+    wish = os.environ.get("MUJOCO_GL", "").strip().lower()
+    probes = []
+    for backend in (wish,) if wish else BACKENDS:
+        probes.append(probe(backend))
+        if probes[-1].ok:
+            return probes[-1]
+    reasons = "; ".join(f"{p.backend}: {p.problem}" for p in probes)
+    raise RenderError(
+        f"No headless OpenGL back end renders ({reasons}); "
+        f"run '{FIXES.get(wish, FIXES['egl'])}' and try again."
+    )

@@ -1,0 +1,15 @@
+"""The native form of a pool: a LeRobotDataset v3.0 directory."""
+
+from teasim.pool.lerobot.finalize import finalize_pool
+from teasim.pool.lerobot.reader import Episode, Pool
+from teasim.pool.lerobot.staging import claim_folder, episode_is_done
+from teasim.pool.lerobot.writer import EpisodeWriter
+
+__all__ = [
+    "Episode",
+    "EpisodeWriter",
+    "Pool",
+    "claim_folder",
+    "episode_is_done",
+    "finalize_pool",
+]

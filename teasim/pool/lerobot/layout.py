@@ -1,0 +1,99 @@
+"""Names and places of a LeRobotDataset v3.0 with one data file and one mp4 per demonstration."""
+
+from pathlib import Path
+from typing import Any
+
+from teasim.pool.types import PoolHeader
+
+CODEBASE_VERSION = "v3.0"
+CHUNK_SIZE = 1000
+
+INFO = Path("meta/info.json")
+STATS = Path("meta/stats.json")
+TASKS = Path("meta/tasks.parquet")
+SUBTASKS = Path("meta/subtasks.parquet")
+TEMPORAL_PROPORTIONS = Path("meta/temporal_proportions_sparse.json")
+EPISODES_FOLDER = Path("meta/episodes")
+EPISODES = EPISODES_FOLDER / "chunk-000/file-000.parquet"
+MANIFEST = Path("teasim/manifest.json")
+STAGING = Path(".incomplete")
+
+DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+
+CAMERA_PREFIX = "observation.images."
+STATE = "observation.state"
+ACTION = "action"
+ENVIRONMENT_STATE = "observation.environment_state"
+SUBTASK_INDEX = "subtask_index"
+
+NO_SUBTASK_NAME = "none"
+"""Last row of `subtasks.parquet`: readers that index it by position find it under -1."""
+
+
+def place_of(index: int) -> tuple[int, int]:
+    """Chunk and file index of demonstration `index`."""
+    return divmod(index, CHUNK_SIZE)
+
+
+def data_path(index: int) -> str:
+    """Path of the data file of demonstration `index`, relative to the pool."""
+    chunk, file = place_of(index)
+    return DATA_PATH.format(chunk_index=chunk, file_index=file)
+
+
+def video_path(camera: str, index: int) -> str:
+    """Path of the mp4 of demonstration `index` by `camera`, relative to the pool."""
+    chunk, file = place_of(index)
+    return VIDEO_PATH.format(video_key=CAMERA_PREFIX + camera, chunk_index=chunk, file_index=file)
+
+
+def features_of(header: PoolHeader) -> dict[str, dict[str, Any]]:
+    """The `features` of info.json: logs that were not made are absent, not zero."""
+    features: dict[str, dict[str, Any]] = {}
+    if header.state_names is not None:
+        features[STATE] = _vector(header.state_names)
+        features[ACTION] = _vector(header.state_names)
+    if header.environment_state_names is not None:
+        features[ENVIRONMENT_STATE] = _vector(header.environment_state_names)
+    for camera in header.cameras:
+        features[CAMERA_PREFIX + camera] = _video(header)
+    features |= {
+        SUBTASK_INDEX: _scalar("int64"),
+        "next.reward": _scalar("float32"),
+        "next.success": _scalar("bool"),
+        "next.done": _scalar("bool"),
+        "timestamp": _scalar("float32"),
+        "frame_index": _scalar("int64"),
+        "episode_index": _scalar("int64"),
+        "index": _scalar("int64"),
+        "task_index": _scalar("int64"),
+    }
+    return features
+
+
+def _vector(names: tuple[str, ...]) -> dict[str, Any]:
+    return {"dtype": "float32", "shape": [len(names)], "names": list(names)}
+
+
+def _scalar(dtype: str) -> dict[str, Any]:
+    return {"dtype": dtype, "shape": [1], "names": None}
+
+
+def _video(header: PoolHeader) -> dict[str, Any]:
+    return {
+        "dtype": "video",
+        "shape": [header.height, header.width, 3],
+        "names": ["height", "width", "channels"],
+        "info": {
+            "video.height": header.height,
+            "video.width": header.width,
+            "video.codec": "h264",
+            "video.pix_fmt": "yuv420p",
+            "video.is_depth_map": False,
+            "is_depth_map": False,
+            "video.fps": header.fps,
+            "video.channels": 3,
+            "has_audio": False,
+        },
+    }

@@ -1,0 +1,204 @@
+"""One arm as a skill sees it: motions are generators of targets, one per control step."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from mink import SE3
+
+from teasim.constants import ARMS, CONTROL_TIMESTEP, GRIPPER_SQUEEZE
+from teasim.errors import SkillError
+from teasim.skills.geometry import (
+    EASE_PEAK,
+    between,
+    ease,
+    flipped,
+    position,
+    rotation,
+    shifted,
+    turn_angle,
+)
+from teasim.skills.ik import kinematics
+from teasim.world.control import FINGER_SPEED
+from teasim.world.simulation import Simulation
+from teasim.world.yumi import JOINT_SPEEDS, READY
+
+Motion = Iterator[np.ndarray]
+"""Targets (16,) of successive control steps."""
+
+SPEED_MARGIN = 0.85
+"""Share of the joints' largest speeds that a plan may use."""
+_REPLANS = 4
+
+
+@dataclass(frozen=True)
+class Style:
+    """How somebody does things: variation that is not a mistake."""
+
+    tempo: float = 1.7
+    """Speed of all motions relative to the nominal one."""
+    lift: float = 0.07
+    """Height by which things are lifted before they are carried [m]."""
+    bow: float = 0.0
+    """Sideways bow of the free motions between READY and an object [rad of the base joint]."""
+    pause: float = 0.3
+    """Rest before each sub-task [s]."""
+    stir_turns: float = 3.0
+    """Turns of the spoon in the cup."""
+
+
+class Arm:
+    """Plans and paces the motions of one arm; the other one keeps its last target."""
+
+    CARRY_SPEED = 0.35
+    """Peak speed of the hand while carrying [m/s]."""
+    APPROACH_SPEED = 0.14
+    """Peak speed of the hand near things [m/s]."""
+    TURN_SPEED = 1.2
+    """Peak speed of turning and tilting [rad/s]."""
+    REACH_SPEED = 1.2
+    """Peak speed of the fastest joint in free motions [rad/s]."""
+
+    def __init__(
+        self, side: str, simulation: Simulation, style: Style, posture: np.ndarray | None = None
+    ) -> None:
+        self.simulation, self.style = simulation, style
+        self._side = side
+        self._posture = READY[side] if posture is None else np.asarray(posture)
+        self._kinematics = kinematics(side)
+        self._kinematics.prefer(self._posture)
+        first = 7 * ARMS.index(side)
+        self._joints = slice(first, first + 7)
+        self._hand = 14 + ARMS.index(side)
+
+    @property
+    def joints(self) -> np.ndarray:
+        """Last target of the arm's joints (7,) [rad]."""
+        return self.simulation.target[self._joints]
+
+    @property
+    def tcp(self) -> SE3:
+        """Pose of the tool centre point at the last target."""
+        return self._kinematics.pose(self.joints)
+
+    # -- motions ---------------------------------------------------------------------------------
+
+    def wait(self, seconds: float) -> Motion:
+        """Hold still."""
+        for _ in range(_steps(seconds)):
+            yield self.simulation.target.copy()
+
+    def hand(self, opening: float) -> Motion:
+        """Open or close to `opening` [m] and wait until the fingers have had time to get there."""
+        before = max(float(self.simulation.joint_state()[self._hand]), 0.0)
+        travel = abs(before - max(opening, 0.0)) / 2
+        target = self.simulation.target.copy()
+        target[self._hand] = opening
+        settle = 0.15 if opening > before else 0.3
+        for _ in range(_steps(travel / FINGER_SPEED + settle)):
+            yield target.copy()
+
+    def squeeze(self) -> Motion:
+        """Close on whatever is between the fingers."""
+        before = float(self.simulation.joint_state()[self._hand])
+        target = self.simulation.target.copy()
+        target[self._hand] = GRIPPER_SQUEEZE
+        for _ in range(_steps(max(before, 0.0) / 2 / FINGER_SPEED + 0.4)):
+            yield target.copy()
+
+    def park(self) -> Motion:
+        """Go back to READY."""
+        yield from self._free(READY[self._side])
+
+    def reach(self, goal: SE3) -> Motion:
+        """Free motion, straight in joint space, to `goal`."""
+        yield from self._free(self._kinematics.solve(goal, self._posture))
+
+    def line(self, goal: SE3, speed: float | None = None) -> Motion:
+        """Straight motion of the hand to `goal` with a peak `speed` [m/s]."""
+        start = self.tcp
+        distance = np.linalg.norm(position(goal) - position(start))
+        turn = turn_angle(start, goal)
+        peak = max(distance / (speed or self.CARRY_SPEED), turn / self.TURN_SPEED)
+        yield from self.path(lambda share: between(start, goal, share), peak * EASE_PEAK)
+
+    def path(self, curve: Callable[[float], SE3], seconds: float, *, eased: bool = True) -> Motion:
+        """Follow `curve` over [0, 1] in `seconds` at nominal tempo, slower if a joint must."""
+        count = _steps(seconds / self.style.tempo)
+        for _ in range(_REPLANS):
+            shares = np.linspace(0, 1, count + 1)[1:]
+            plan = self._solve(curve, ease(shares) if eased else shares)
+            excess = self._excess_speed(plan)
+            if excess <= 1:
+                yield from self._play(plan)
+                return
+            count = int(np.ceil(count * min(excess * 1.05, 3.0)))
+        raise SkillError(
+            f"The {self._side} arm cannot follow a path within its joint speeds; "
+            "move the object nearer to its nominal place."
+        )
+
+    # -- grasps ----------------------------------------------------------------------------------
+
+    def easier(self, grasp: SE3) -> SE3:
+        """The grasp itself or with the fingers exchanged: whichever is nearer to the posture."""
+        other = flipped(grasp)
+        return grasp if self._distance(grasp) <= self._distance(other) else other
+
+    def take(self, grasp: SE3, opening: float, back: float = 0.07) -> Motion:
+        """Open, come in along the tool's axis from `back` [m] away, and squeeze."""
+        before = shifted(grasp, -back * rotation(grasp)[:, 2])
+        yield from self._together(self.reach(before), opening)
+        yield from self.line(grasp, self.APPROACH_SPEED)
+        yield from self.squeeze()
+
+    def release(self, opening: float, back: float = 0.07) -> Motion:
+        """Open by `opening` [m] and retreat along the tool's axis."""
+        yield from self.hand(opening)
+        yield from self.line(shifted(self.tcp, -back * rotation(self.tcp)[:, 2]), 0.2)
+
+    # -- parts -----------------------------------------------------------------------------------
+
+    def _together(self, motion: Motion, opening: float) -> Motion:
+        """Move while the hand goes to `opening`."""
+        for target in motion:
+            target[self._hand] = opening
+            yield target
+
+    def _distance(self, goal: SE3) -> float:
+        try:
+            joints = self._kinematics.solve(goal, self._posture)
+            return float(np.linalg.norm(joints - self._posture))
+        except SkillError:
+            return np.inf
+
+    def _solve(self, curve: Callable[[float], SE3], shares: np.ndarray) -> np.ndarray:
+        plan, seed = [], self.joints
+        for share in shares:
+            seed = self._kinematics.solve(curve(float(share)), seed)
+            plan.append(seed)
+        return np.array(plan)
+
+    def _excess_speed(self, plan: np.ndarray) -> float:
+        steps = np.abs(np.diff(plan, axis=0, prepend=self.joints[None]))
+        return float((steps / CONTROL_TIMESTEP / (SPEED_MARGIN * JOINT_SPEEDS)).max())
+
+    def _free(self, goal: np.ndarray) -> Motion:
+        start = self.joints.copy()
+        span = float(np.abs(goal - start).max())
+        count = _steps(max(span / self.REACH_SPEED * EASE_PEAK / self.style.tempo, 0.5))
+        shares = np.linspace(0, 1, count + 1)[1:]
+        plan = start + ease(shares)[:, None] * (goal - start)
+        plan[:, 0] += self.style.bow * np.sin(np.pi * shares) ** 2
+        yield from self._play(plan)
+
+    def _play(self, plan: np.ndarray) -> Motion:
+        for joints in plan:
+            target = self.simulation.target.copy()
+            target[self._joints] = joints
+            yield target
+
+
+def _steps(seconds: float) -> int:
+    """Number of control steps that last at least `seconds`."""
+    return max(int(np.ceil(seconds / CONTROL_TIMESTEP - 1e-9)), 1)

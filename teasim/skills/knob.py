@@ -1,0 +1,45 @@
+"""Turning the oven's knob: grasp its bar from above, turn the wrist by a quarter."""
+
+import numpy as np
+
+from teasim.skills.arm import Arm, Motion
+from teasim.skills.geometry import DOWN, UP, about, pose, position, rotation, tool
+from teasim.world.simulation import Simulation
+
+OPENING = 0.032
+"""Opening of the gripper before and after the grasp [m]."""
+GRASP_HEIGHT = 0.025
+"""Height of the tool centre point above the hob's top [m]."""
+TURN = np.pi / 2
+"""Angle between off and on [rad]."""
+
+
+def turn_knob_to(arm: Arm, goal: float) -> Motion:
+    """Turn the knob to `goal` [rad] and let it go."""
+    angle, place = _knob(arm.simulation)
+    across = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    grasp = arm.easier(pose(place + GRASP_HEIGHT * UP, tool(DOWN, across)))
+    yield from arm.take(grasp, OPENING)
+    turn = goal - angle
+
+    def turned(share: float) -> object:
+        return pose(position(grasp), about(UP, turn * share) @ rotation(grasp))
+
+    yield from arm.path(turned, max(abs(turn), 0.1) / arm.TURN_SPEED * 1.6)
+    yield from arm.release(OPENING)
+    yield from arm.park()
+
+
+def turn_on_oven(arm: Arm) -> Motion:
+    """Turn the oven's knob from off to on."""
+    yield from turn_knob_to(arm, TURN)
+
+
+def turn_off_oven(arm: Arm) -> Motion:
+    """Turn the oven's knob from on to off."""
+    yield from turn_knob_to(arm, 0.0)
+
+
+def _knob(simulation: Simulation) -> tuple[float, np.ndarray]:
+    angle = float(simulation.data.joint("knob").qpos[0])
+    return angle, np.array(simulation.data.body("knob").xpos)

@@ -1,0 +1,60 @@
+"""Every sub-task's skill: which arm does it, and how."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from teasim.skills.arm import Arm, Motion, Style
+from teasim.skills.knob import turn_off_oven, turn_on_oven
+from teasim.skills.pour import add_milk, add_sugar, add_water
+from teasim.skills.stir import stir
+from teasim.skills.tea_bag import add_tea_bag
+from teasim.task.recipes import check_subtask
+from teasim.world.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Skill:
+    """A sub-task as one arm carries it out."""
+
+    arm: str
+    """The arm that can reach what is needed."""
+    motion: Callable[[Arm], Motion]
+    """Generator of targets, from READY back to READY."""
+    posture: tuple[float, ...] | None = None
+    """Joint angles the arm stays near [rad], kinematic order; READY by default."""
+
+
+# Found by random search over 20 layouts: the whole path from the grasp to the full tilt stays
+# inside the soft limits, and no joint has to hurry. From READY the elbow runs into its limit.
+KETTLE_POSTURE = (1.61, -2.00, -1.65, 0.48, -0.81, -0.17, 1.86)
+SUGAR_POSTURE = (-0.40, -1.89, 0.97, 0.01, -0.19, 0.45, 0.82)
+MILK_POSTURE = (-1.07, -2.15, 0.75, 0.14, 1.32, 1.95, 1.56)
+
+SKILLS: Mapping[str, Skill] = MappingProxyType(
+    {
+        "turn_on_oven": Skill("right", turn_on_oven),
+        "add_water": Skill("right", add_water, KETTLE_POSTURE),
+        "add_sugar": Skill("left", add_sugar, SUGAR_POSTURE),
+        "add_milk": Skill("left", add_milk, MILK_POSTURE),
+        "add_tea_bag": Skill("left", add_tea_bag),
+        "stir": Skill("left", stir),
+        "turn_off_oven": Skill("right", turn_off_oven),
+    }
+)
+
+
+def perform(subtask: str, simulation: Simulation, style: Style) -> Motion:
+    """Targets (16,) that carry out `subtask`; feed each to `simulation.step` before the next.
+
+    Raises:
+        ConfigError: there is no such sub-task.
+        SkillError: while iterating, when it cannot be done from the present state.
+    """
+    skill = SKILLS[check_subtask(subtask)]
+    posture = None if skill.posture is None else np.array(skill.posture)
+    arm = Arm(skill.arm, simulation, style, posture)
+    yield from arm.wait(style.pause)
+    yield from skill.motion(arm)

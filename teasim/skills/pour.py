@@ -1,0 +1,146 @@
+"""Pouring from kettle, milk jug and sugar pot into the cup.
+
+The vessel is held by its upright handle, carried beside the cup, and turned about the horizontal
+axis across its spout. The spout has to start beside the cup and move in as the vessel tilts, or the
+vessel's belly hits the near rim.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from mink import SE3
+
+from teasim.constants import CONTROL_TIMESTEP
+from teasim.errors import SkillError
+from teasim.skills.arm import Arm, Motion
+from teasim.skills.geometry import DOWN, UP, about, pose, position, rotation, shifted, tool
+from teasim.world.liquids import RIM_HEIGHT
+from teasim.world.simulation import Simulation
+from teasim.world.station import NOMINAL, body_name
+
+PITCH = np.radians(30)
+"""Downward pitch of the gripper at the handle [rad]: less meets the table, more the vessel."""
+FULL_TILT = np.radians(100)
+"""Tilt at which a vessel runs empty [rad]."""
+CLEARANCE = 0.006
+"""Gap between the vessel's belly and the rim of the cup [m]."""
+CUP_OUTER = 0.040
+"""Outer radius of the cup [m]."""
+SPOUT_HEIGHT = 0.025
+"""Height of the spout above the rim while pouring [m]; as much again before the tilt."""
+LONGEST_HOLD = 4.0
+"""A vessel is held over the cup at most this long [s]."""
+
+
+@dataclass(frozen=True)
+class Grip:
+    """How a vessel is grasped and where its spout is."""
+
+    vessel: str
+    """Name of the vessel."""
+    opening: float
+    """Opening of the gripper around the handle [m]: wider and the inner finger meets the belly."""
+    belly: float
+    """Outer radius of the vessel [m]."""
+    spout: tuple[float, float, float]
+    """Tip of the spout in the vessel's frame [m]."""
+    closing: float = 1.0
+    """1 when the hand's closing axis points to the spout, -1 when it points to the handle."""
+
+
+KETTLE = Grip("kettle", 0.030, 0.042, (0.062, 0.0, 0.072), -1.0)
+MILK_JUG = Grip("milk_jug", 0.022, 0.026, (0.036, 0.0, 0.062))
+SUGAR_POT = Grip("sugar_pot", 0.022, 0.026, (0.034, 0.0, 0.052))
+
+
+def pour(arm: Arm, grip: Grip) -> Motion:
+    """Pour the vessel into the cup until it is empty and put it back where it stood.
+
+    Raises:
+        SkillError: the vessel does not stand upright.
+    """
+    simulation = arm.simulation
+    home = _vessel_pose(simulation, grip)
+    if rotation(home)[2, 2] < np.cos(np.radians(15)):
+        raise SkillError(f"The {grip.vessel} does not stand upright; reset the station.")
+    yield from arm.take(_grasp(simulation, grip, home), grip.opening)
+    yield from arm.line(shifted(arm.tcp, arm.style.lift * UP), arm.APPROACH_SPEED * 1.5)
+    held = _vessel_pose(simulation, grip).inverse() @ arm.tcp  # the hand in the vessel's frame
+    tilted = _over_cup(simulation, grip, held)
+    above = home @ held
+    yield from arm.line(tilted(0.0))
+    seconds = FULL_TILT / arm.TURN_SPEED * 1.6
+    yield from arm.path(tilted, seconds)
+    yield from _until_empty(arm, grip)
+    yield from arm.path(lambda share: tilted(1 - share), seconds)
+    yield from arm.line(shifted(above, arm.style.lift * UP))
+    yield from arm.line(shifted(above, 0.001 * UP), arm.APPROACH_SPEED * 1.5)
+    yield from arm.release(grip.opening)
+    yield from arm.park()
+
+
+def add_water(arm: Arm) -> Motion:
+    """Pour the kettle into the cup."""
+    yield from pour(arm, KETTLE)
+
+
+def add_milk(arm: Arm) -> Motion:
+    """Pour the milk jug into the cup."""
+    yield from pour(arm, MILK_JUG)
+
+
+def add_sugar(arm: Arm) -> Motion:
+    """Tip the sugar pot over the cup."""
+    yield from pour(arm, SUGAR_POT)
+
+
+def _vessel_pose(simulation: Simulation, grip: Grip) -> SE3:
+    body = simulation.data.body(body_name(grip.vessel))
+    return pose(body.xpos.copy(), body.xmat.reshape(3, 3).copy())
+
+
+def _grasp(simulation: Simulation, grip: Grip, home: SE3) -> SE3:
+    handle = simulation.data.site(f"{grip.vessel}/grasp").xpos.copy()
+    spout = rotation(home)[:, 0]
+    sideways = np.cross(UP, spout)
+    away = sideways if sideways[0] > 0 else -sideways  # away from the robot
+    return pose(handle, tool(np.cos(PITCH) * away + np.sin(PITCH) * DOWN, grip.closing * spout))
+
+
+def _over_cup(simulation: Simulation, grip: Grip, held: SE3) -> Callable[[float], SE3]:
+    """Pose of the hand for a share of the full tilt, the spout kept over the cup."""
+    cup = simulation.data.body(body_name("cup")).xpos.copy()
+    yaw = NOMINAL[grip.vessel].yaw
+    towards = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    upright = about(UP, yaw)
+    spout = np.array(grip.spout)
+
+    def hand(share: float) -> SE3:
+        tilt = FULL_TILT * share
+        turned = about(np.cross(UP, towards), tilt) @ upright
+        fade = max(1 - tilt / np.radians(40), 0.0)
+        tip = cup - spout_offset(grip, tilt) * towards
+        tip = tip + (RIM_HEIGHT + SPOUT_HEIGHT * (1 + fade)) * UP
+        return pose(tip - turned @ spout, turned) @ held
+
+    return hand
+
+
+def spout_offset(grip: Grip, tilt: float) -> float:
+    """Distance of the spout from the cup's axis that keeps the belly clear of the rim [m]."""
+    overhang = grip.spout[0] - grip.belly
+    if tilt >= np.radians(80):
+        return 0.0
+    drop = SPOUT_HEIGHT - CLEARANCE + overhang * np.sin(tilt)
+    reach = CUP_OUTER + CLEARANCE - overhang * np.cos(tilt) - drop * np.tan(tilt)
+    return float(max(reach, 0.0))
+
+
+def _until_empty(arm: Arm, grip: Grip) -> Motion:
+    """Hold until nothing flows any more: by the level, not by the clock."""
+    liquids = arm.simulation.liquids
+    for _ in range(round(LONGEST_HOLD / CONTROL_TIMESTEP)):
+        yield from arm.wait(CONTROL_TIMESTEP)
+        if liquids.amounts[grip.vessel] < 0.5:
+            return

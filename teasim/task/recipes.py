@@ -1,0 +1,88 @@
+"""The orders in which tea is made: the paper's three sequences and the precedence behind them."""
+
+from collections.abc import Sequence
+from types import MappingProxyType
+
+from teasim.constants import SUBTASKS
+from teasim.errors import ConfigError
+
+SEQ_1 = (
+    "turn_on_oven",
+    "add_tea_bag",
+    "add_sugar",
+    "add_milk",
+    "turn_off_oven",
+    "add_water",
+    "stir",
+)
+"""The optimal order (the paper, section 4)."""
+
+SEQ_2 = (
+    "turn_on_oven",
+    "add_sugar",
+    "add_milk",
+    "add_tea_bag",
+    "turn_off_oven",
+    "add_water",
+    "stir",
+)
+"""The sub-optimal order: the tea bag goes in late."""
+
+CRITICAL = ("add_tea_bag", "add_water", "turn_off_oven")
+"""Seq_3 leaves out one or two of these."""
+
+PRECEDENCE = MappingProxyType(
+    {
+        "turn_on_oven": (),
+        "add_tea_bag": ("turn_on_oven",),
+        "add_sugar": ("turn_on_oven",),
+        "add_milk": ("turn_on_oven",),
+        "turn_off_oven": ("turn_on_oven",),
+        "add_water": ("turn_off_oven",),
+        "stir": ("add_tea_bag", "add_sugar", "add_milk", "add_water"),
+    }
+)
+"""What must have happened before each sub-task in a correct demonstration."""
+
+OPTIMAL, SUBOPTIMAL, INCORRECT = "seq_1", "seq_2", "seq_3"
+SEQUENCES = (OPTIMAL, SUBOPTIMAL, INCORRECT)
+
+
+def check_subtask(name: str) -> str:
+    """Return `name` if it is one of the seven sub-tasks.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if name not in SUBTASKS:
+        raise ConfigError(f"Unknown sub-task '{name}'; choose {', '.join(SUBTASKS)}.")
+    return name
+
+
+def is_legal(order: Sequence[str]) -> bool:
+    """Whether `order` holds every sub-task once and respects the precedence."""
+    if sorted(order) != sorted(SUBTASKS):
+        return False
+    return all(before in order[:k] for k, name in enumerate(order) for before in PRECEDENCE[name])
+
+
+def next_correct(done: Sequence[str]) -> str | None:
+    """The reference's next sub-task: the first of Seq_1 not done yet; None when all are done.
+
+    Stirring that came too early has to be done again.
+    """
+    missing = [name for name in SEQ_1 if name not in done]
+    if missing:
+        return missing[0]
+    return None if done[-1] == "stir" else "stir"
+
+
+def allowed_next(done: Sequence[str]) -> tuple[str, ...]:
+    """Every sub-task that the precedence allows next and that is still needed."""
+    open_steps = [name for name in SUBTASKS if name not in done]
+    if not open_steps:
+        return () if done[-1] == "stir" else ("stir",)
+    allowed = [name for name in open_steps if all(p in done for p in PRECEDENCE[name])]
+    if not allowed and "stir" in done:  # stirred too early, and the rest waits for nothing
+        return ("stir",)
+    return tuple(allowed)

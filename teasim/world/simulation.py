@@ -1,0 +1,123 @@
+"""One running station: physics, liquids and events, advanced one control step at a time."""
+
+import mujoco
+import numpy as np
+
+from teasim.constants import (
+    ARM_JOINTS,
+    ARMS,
+    PHYSICS_TIMESTEP,
+    STEPS_PER_UPDATE,
+    UPDATES_PER_CONTROL,
+)
+from teasim.world.control import Controller
+from teasim.world.events import Event, Recogniser
+from teasim.world.liquids import CONTENTS, VESSELS, Liquids, Stream
+from teasim.world.station import FREE_BODIES, Layout, body_name, place, station_model
+from teasim.world.yumi import READY
+
+SETTLE_TIME = 0.8
+"""Things come to rest for this long before an episode starts [s]."""
+_UPDATE = PHYSICS_TIMESTEP * STEPS_PER_UPDATE
+
+ENVIRONMENT_STATE_NAMES = (
+    *(f"{body}_{part}" for body in FREE_BODIES for part in ("x", "y", "z", "qw", "qx", "qy", "qz")),
+    "knob_x",
+    "knob_y",
+    "knob_angle",
+    *(f"{vessel}_amount" for vessel in VESSELS),
+    *(f"cup_{content}" for content in CONTENTS),
+    "cup_tea",
+    "cup_mixed",
+)
+"""Columns of the environment state: poses [m, wxyz], knob [m, rad], amounts [ml or g], shares."""
+
+
+class Simulation:
+    """The tea-making station.
+
+    `model` and `data` may be read; whoever writes them is outside the contract.
+    """
+
+    def __init__(self) -> None:
+        self.model = station_model()
+        self.data = mujoco.MjData(self.model)
+        self.liquids = Liquids(self.model)
+        self.recogniser = Recogniser(self.model)
+        self._controller = Controller(self.model)
+        self._knob = self.model.joint("knob").qposadr[0]
+        self._glow = [self.model.geom("plate").id, self.model.geom("pilot").id]
+        self.target = np.zeros(16)
+
+    def reset(self, layout: Layout) -> None:
+        """Set everything to `layout`, the arms to READY, and let things come to rest."""
+        mujoco.mj_resetData(self.model, self.data)
+        place(self.model, self.data, layout)
+        for arm in ARMS:
+            for name, angle in zip(ARM_JOINTS[arm], READY[arm], strict=True):
+                self.data.joint(name).qpos = angle
+        mujoco.mj_forward(self.model, self.data)
+        self.liquids.reset()
+        self.recogniser.reset()
+        self._controller.reset(self.data)
+        self.target = self._controller.measured(self.data)
+        for _ in range(round(SETTLE_TIME / _UPDATE / UPDATES_PER_CONTROL)):
+            self.step(self.target)
+        self.recogniser.reset()
+        self.data.time = 0.0
+
+    def step(self, target: np.ndarray) -> None:
+        """Advance one control step towards `target` (16,): joint angles [rad], openings [m]."""
+        segment = self._controller.commands(target, self.data)
+        self.target = np.array(target, dtype=float)
+        for update in range(UPDATES_PER_CONTROL):
+            segment.apply(update, self.data)
+            mujoco.mj_step(self.model, self.data, nstep=STEPS_PER_UPDATE)
+            self.recogniser.update(self.data, self.liquids)
+            self.liquids.update(
+                self.data,
+                _UPDATE,
+                brewing=self.recogniser.bag_in_cup,
+                stirring=self.recogniser.stirring,
+            )
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Sub-tasks that happened so far, in order."""
+        return tuple(self.recogniser.events)
+
+    @property
+    def subtasks_done(self) -> tuple[str, ...]:
+        """Names of the sub-tasks that happened so far, in order."""
+        return tuple(event.subtask for event in self.recogniser.events)
+
+    @property
+    def oven_on(self) -> bool:
+        """Whether the oven is on now."""
+        return self.recogniser.oven_on
+
+    @property
+    def streams(self) -> tuple[Stream, ...]:
+        """Streams in the air now."""
+        return self.liquids.streams
+
+    def joint_state(self) -> np.ndarray:
+        """Measured joint angles [rad] and gripper openings [m] (16,) float32."""
+        return self._controller.measured(self.data).astype(np.float32)
+
+    def environment_state(self) -> np.ndarray:
+        """Everything but the robot, as named by `ENVIRONMENT_STATE_NAMES` (n,) float32."""
+        poses = [self.data.joint(body_name(name)).qpos for name in FREE_BODIES]
+        knob = [*self.model.body("knob").pos[:2], self.data.qpos[self._knob]]
+        liquids = self.liquids
+        amounts = [*liquids.amounts.values(), *liquids.cup.values(), liquids.tea, liquids.mixed]
+        return np.concatenate([*poses, knob, amounts]).astype(np.float32)
+
+    def paint(self) -> None:
+        """Bring what can be seen up to date: levels, colours, and the glow of the hob."""
+        self.liquids.paint(self.model)
+        plate, pilot = self._glow
+        on = self.oven_on
+        self.model.geom_matid[plate] = -1
+        self.model.geom_rgba[plate] = (0.95, 0.25, 0.08, 1) if on else (0.26, 0.26, 0.28, 1)
+        self.model.geom_rgba[pilot] = (1.0, 0.15, 0.10, 1) if on else (0.25, 0.05, 0.05, 1)

@@ -1,0 +1,74 @@
+"""What an import costs and reaches: what import-linter cannot see, or cannot say."""
+
+import ast
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("teasim", "filtering", "policies")
+HEAVY = {"torch", "mujoco", "mink", "cv2", "stable_baselines3", "sklearn", "scipy"}
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Top-level packages in memory after a statement, in a fresh interpreter."""
+    program = f"{statement}\nimport sys; print(*{{name.split('.')[0] for name in sys.modules}})"
+    command = [sys.executable, "-c", program]
+    return set(subprocess.check_output(command, cwd=ROOT, text=True).split())
+
+
+@pytest.mark.parametrize(
+    ("module", "unwanted"),
+    [
+        ("teasim", HEAVY),
+        ("teasim.cli.main", {*HEAVY, "tyro"}),
+        ("teasim.gl", HEAVY),
+        ("teasim.pool", {"torch", "mujoco", "mink", "stable_baselines3"}),
+        ("filtering", {"torch", "mujoco", "stable_baselines3"}),
+        ("policies.cli", HEAVY),
+    ],
+)
+def test_importing_loads_nothing_heavy(module, unwanted):
+    assert loaded_by(f"import {module}") & unwanted == set()
+
+
+def test_the_dispatcher_knows_no_room():
+    graph = grimp.build_graph(*PACKAGES, include_external_packages=False, cache_dir=None)
+    assert graph.find_modules_directly_imported_by("teasim.cli.main") == {"teasim.errors"}
+
+
+def modules() -> list[str]:
+    return [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for package in PACKAGES
+        for path in sorted((ROOT / package).rglob("*.py"))
+    ]
+
+
+def test_every_exported_name_exists():
+    for name in modules():
+        tree = ast.parse(source(name))
+        if any(isinstance(node, ast.Name) and node.id == "__all__" for node in ast.walk(tree)):
+            module = import_module(name)
+            missing = [public for public in module.__all__ if not hasattr(module, public)]
+            assert missing == [], name
+
+
+def source(name: str) -> str:
+    path = ROOT.joinpath(*name.split("."))
+    return (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+
+
+def test_functions_fit_on_a_screen():
+    too_long = [
+        f"{name}:{node.lineno} {node.name}"
+        for name in modules()
+        for node in ast.walk(ast.parse(source(name)))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and node.end_lineno - node.lineno >= 50
+    ]
+    assert too_long == []

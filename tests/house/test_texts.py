@@ -1,0 +1,112 @@
+"""The texts keep their promises: commands exist, links lead somewhere, nothing names a machine."""
+
+import ast
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
+VERBS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][
+    "teasim.verbs"
+]
+MARKDOWN = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/results.md"]
+SCRIPTS = ["scripts/setup", "scripts/test", "scripts/demo", ".ci/run"]
+TEXTS = {".py", ".md", ".toml", ".xml", ".html", ".j2", ".css", ".js", ".yml", ".yaml", ".lock", ""}
+
+# Folders of one machine, hosts of package registries, numbers of a tracker.
+FORBIDDEN = re.compile(
+    r"(?<![\w.])/(?:root|home|work|Users|opt)/"
+    r"|pypi\.(?:org|python)|pythonhosted\.|download\.pytorch"
+    r"|\bissue #\d",
+    re.IGNORECASE,
+)
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def commands() -> list[list[str]]:
+    lines = "".join(blocks("bash")).splitlines()
+    return [shlex.split(line, comments=True) for line in lines if line.strip()]
+
+
+def project_texts() -> list[Path]:
+    """Every text file of the project that is not made by running it."""
+    kept = []
+    for folder, folders, names in os.walk(ROOT):
+        folders[:] = [f for f in folders if f not in ("out", "dist", "__pycache__")]
+        folders[:] = [f for f in folders if not f.startswith(".") or f in (".ci", ".github")]
+        kept += [Path(folder, name) for name in names if Path(name).suffix in TEXTS]
+    return kept
+
+
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= 140
+
+
+@pytest.mark.parametrize("name", MARKDOWN)
+def test_links_lead_somewhere(name):
+    path = ROOT / name
+    targets = re.findall(r"\]\(([^)#]+)[^)]*\)", path.read_text())
+    missing = [t for t in targets if "://" not in t and not (path.parent / t).exists()]
+    assert missing == []
+
+
+def test_the_readmes_scripts_and_verbs_exist():
+    assert {"scripts/demo", "scripts/test"} <= {words[0] for words in commands()}
+    for program, *rest in commands():
+        if program == "teasim":
+            assert rest[0] in VERBS
+        else:
+            assert program in SCRIPTS
+
+
+def test_the_readme_names_every_verb():
+    assert {verb for verb in VERBS if f"| `teasim {verb}` |" in README} == set(VERBS)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_the_readmes_options_exist(verb):
+    used = {
+        word
+        for program, *rest in commands()
+        if program == "teasim" and rest[0] == verb
+        for word in rest
+        if word.startswith("-")
+    }
+    command = [sys.executable, "-m", "teasim", verb, "--help"]
+    known = subprocess.check_output(command, text=True, cwd=ROOT)
+    assert {option for option in used if not re.search(rf"{option}\b", known)} == set()
+
+
+def test_the_readmes_python_is_python_and_its_imports_exist():
+    for block in blocks("python"):
+        for node in ast.walk(ast.parse(block)):
+            if isinstance(node, ast.ImportFrom):
+                names = ", ".join(alias.name for alias in node.names)
+                statement = f"from {node.module} import {names}"
+                subprocess.run([sys.executable, "-c", statement], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_scripts_can_be_run(name):
+    assert os.access(ROOT / name, os.X_OK)
+    subprocess.run(["bash", "-n", ROOT / name], check=True)
+
+
+def test_no_text_names_a_machine_a_registry_or_a_tracker():
+    found = [
+        f"{path.relative_to(ROOT)}: {match[0]}"
+        for path in project_texts()
+        for match in [FORBIDDEN.search(path.read_text(errors="replace"))]
+        if match
+    ]
+    assert found == []

@@ -1,0 +1,103 @@
+"""A policy whose every choice is known gets exactly the scores that follow from them."""
+
+import numpy as np
+import pytest
+
+from policies.evaluation import MODES, EvaluationConfig, evaluate
+from policies.rollout import EnvironmentConfig, make_environment, run_episode
+from policies.statistics import rate
+from teasim.errors import CheckpointError, ConfigError
+from teasim.pool.videos import VideoClip, count_decodable, read_frames
+from tests.policies.fakes import FAKE_WORLD, SEQ_1, SUBTASKS, ScriptedPolicy
+
+
+def config(episodes=3, **others):
+    return EvaluationConfig(episodes, environment=FAKE_WORLD, **others)
+
+
+def test_the_reference_order_scores_100_percent_in_both_modes():
+    scores = evaluate(ScriptedPolicy(), config())
+    assert tuple(scores) == MODES
+    for s in scores.values():
+        assert s.policy_accuracy.hits == s.policy_accuracy.trials == 21
+        assert s.lenient_accuracy.value == s.success.value == 1
+        assert s.unsafe.value == 0
+        assert all(done == rate(3, 3) for done in s.completion.values())
+        assert s.violations == {}
+        assert [episode.seed for episode in s.episodes] == [1000, 1001, 1002]
+
+
+def test_another_legal_order_is_lenient_but_not_strict():
+    s = evaluate(ScriptedPolicy((0, 2, 4, 3, 6, 1, 5)), config(1))["deterministic"]
+    assert s.success.value == s.lenient_accuracy.value == 1
+    # Sugar first: wrong; then the tea bag, which the reference has wanted all along: right.
+    assert [a.correct for a in s.episodes[0].actions] == [True, False, *[True] * 5]
+
+
+def test_an_oven_left_on_is_unsafe_and_a_stuck_policy_is_cut_off():
+    s = evaluate(ScriptedPolicy((0, 4, 4, 4, 4, 4, 4)), config(2))["deterministic"]
+    assert s.unsafe.value == 1
+    assert s.success.value == 0
+    assert s.policy_accuracy.hits == 4
+    assert s.policy_accuracy.trials == 28
+    assert s.completion["add_tea_bag"].value == 1
+    assert s.completion["stir"].value == 0
+    assert s.violations == {
+        "add_tea_bag too early or again": 2,
+        "turn_on_oven too early or again": 2,
+    }
+
+
+def test_the_interval_counts_episodes_not_repeated_errors():
+    s = evaluate(ScriptedPolicy((0, 4, 4, 4, 4, 4, 4)), config(1))["deterministic"]
+    assert s.policy_accuracy.high > 0.7
+
+
+def test_workers_change_nothing():
+    assert evaluate(ScriptedPolicy(), config(5), jobs=2) == evaluate(ScriptedPolicy(), config(5))
+
+
+def test_every_action_is_told_from_the_reference():
+    with make_environment(FAKE_WORLD, ScriptedPolicy.spec) as env:
+        episode = run_episode(env, ScriptedPolicy(), 0, deterministic=True)
+    assert [action.reference for action in episode.actions] == [SUBTASKS[a] for a in SEQ_1]
+
+
+def test_a_policy_for_other_subtasks_is_refused():
+    policy = ScriptedPolicy()
+    policy.action_names = ("crack_egg",)
+    with pytest.raises(CheckpointError) as error:
+        evaluate(policy, config(1))
+    assert str(error.value) == (
+        "The policy chooses from crack_egg, but the environment's sub-tasks are "
+        f"{', '.join(SUBTASKS)}."
+    )
+
+
+def test_a_policy_with_other_joints_is_refused():
+    policy = ScriptedPolicy()
+    policy.spec = type(policy.spec)(("left",), 64, 64, ("elbow",))
+    with pytest.raises(CheckpointError, match=r"sees 1 joint positions, .* shows 16\.$"):
+        evaluate(policy, config(1))
+
+
+def test_an_unknown_environment_is_named():
+    world = EnvironmentConfig("nowhere/Nothing-v0")
+    with pytest.raises(ConfigError, match="Cannot make the environment 'nowhere/Nothing-v0'"):
+        evaluate(ScriptedPolicy(), EvaluationConfig(1, environment=world))
+
+
+def test_no_episode_is_no_evaluation():
+    with pytest.raises(ConfigError, match=r"^episodes is 0; choose 1 or more\.$"):
+        EvaluationConfig(0)
+
+
+def test_the_video_has_one_frame_per_decision_and_the_last(tmp_path):
+    evaluate(ScriptedPolicy(), config(1, video=tmp_path / "seen"))
+    assert [path.name for path in (tmp_path / "seen").iterdir()] == ["episode_1000.mp4"]
+    clip = VideoClip(tmp_path / "seen" / "episode_1000.mp4", 0, 8)
+    assert count_decodable(clip.path) == 8
+    frames = read_frames(clip, range(8))
+    assert frames.shape == (8, 64, 128, 3)
+    assert np.ptp(frames[0].mean(axis=(1, 2))) < 3
+    assert np.ptp(frames[-1].mean(axis=(1, 2))) > 10

@@ -1,0 +1,128 @@
+"""Laws that every learner keeps."""
+
+import numpy as np
+import pytest
+import torch
+
+from policies.learners import LEARNERS, find_learner
+from teasim.errors import ConfigError
+
+EVERY = pytest.mark.parametrize("name", LEARNERS)
+
+
+def fit(name, samples, weights, seed=0):
+    return LEARNERS[name].make(seed=seed).fit(samples, np.asarray(weights, dtype=float))
+
+
+def parameters(learner):
+    return {name: value.numpy() for name, value in learner.policy_.network.state_dict().items()}
+
+
+def assert_same(one, other, **tolerance):
+    first, second = parameters(one), parameters(other)
+    assert first.keys() == second.keys()
+    for name, value in first.items():
+        np.testing.assert_allclose(value, second[name], err_msg=name, **tolerance)
+
+
+CLOSE = {"rtol": 1e-6, "atol": 1e-9}
+"""The order of a sum may differ; what is learned may not."""
+
+
+@EVERY
+def test_weight_0_equals_the_demonstration_removed(name, samples):
+    removed = samples.take(samples.demos != 4)
+    assert_same(fit(name, samples, [1, 1, 1, 1, 0]), fit(name, removed, [1, 1, 1, 1]), rtol=0)
+
+
+@EVERY
+def test_weight_2_equals_the_demonstration_twice(name, samples):
+    rows = np.arange(30)
+    twice = samples.take(np.concatenate([rows, rows[samples.demos == 2]]))
+    assert_same(fit(name, samples, [1, 1, 2, 1, 1]), fit(name, twice, np.ones(5)), **CLOSE)
+
+
+@EVERY
+def test_only_the_proportions_of_weights_count(name, samples):
+    assert_same(fit(name, samples, np.full(5, 0.37)), fit(name, samples, np.ones(5)), **CLOSE)
+
+
+@EVERY
+def test_weights_matter(name, samples):
+    with_error = fit(name, samples, [1, 1, 1, 1, 1])
+    without = fit(name, samples, [1, 1, 1, 1, 0])
+    assert np.abs(parameters(with_error)["layers.0.weight"]).max() > 0
+    with pytest.raises(AssertionError):
+        assert_same(with_error, without, **CLOSE)
+
+
+@EVERY
+def test_a_decision_seen_in_two_frames_counts_once(name, samples):
+    rows = np.arange(30)
+    once = samples.take(rows[samples.shares == 1])
+    halves = once.take(np.repeat(np.arange(len(once.labels)), 2))
+    object.__setattr__(halves, "shares", np.full(len(halves.labels), 0.5))
+    assert_same(fit(name, halves, np.ones(5)), fit(name, once, np.ones(5)), **CLOSE)
+
+
+@EVERY
+def test_one_seed_one_result_whatever_the_global_state(name, samples):
+    torch.manual_seed(1)
+    first = fit(name, samples, np.ones(5))
+    torch.manual_seed(2)
+    threads = torch.get_num_threads()
+    second = fit(name, samples, np.ones(5))
+    assert torch.get_num_threads() == threads
+    assert_same(first, second, rtol=0)
+    assert first.history_ == second.history_
+    with pytest.raises(AssertionError):
+        assert_same(first, fit(name, samples, np.ones(5), seed=1), **CLOSE)
+
+
+@EVERY
+def test_learning_lowers_the_loss_and_fit_returns_self(name, samples):
+    learner = LEARNERS[name].make(seed=0)
+    config = learner.config
+    assert learner.fit(samples, np.ones(5)) is learner
+    assert learner.config is config
+    assert learner.history_[-1] < 0.7 * learner.history_[0]
+
+
+@EVERY
+def test_a_clear_majority_decides(name, samples):
+    policy = fit(name, samples, np.ones(5)).policy_
+    right = samples.take(samples.demos != 4)
+    chosen = policy.action_probabilities(right.inputs).argmax(axis=1)
+    assert (chosen == right.labels).mean() > 0.9
+
+
+@EVERY
+@pytest.mark.parametrize(
+    ("weights", "sentence"),
+    [
+        ([0, 0, 0, 0, 0], "Every demonstration has weight 0, so there is nothing to learn from."),
+        ([1, 1, 1, 1, -1], "A demonstration weight is negative or not a number."),
+        ([1, 1, 1, 1, np.nan], "A demonstration weight is negative or not a number."),
+        ([1, 1], "2 weights do not cover demonstration 4 of the pool."),
+    ],
+)
+def test_weights_that_make_no_sense_are_refused(name, samples, weights, sentence):
+    with pytest.raises(ConfigError) as error:
+        fit(name, samples, weights)
+    assert str(error.value) == sentence
+
+
+def test_an_unknown_learner_or_level_names_the_choices():
+    with pytest.raises(ConfigError) as error:
+        find_learner("cb", "subtask")
+    assert str(error.value) == f"Unknown learner 'cb'; choose {', '.join(LEARNERS)}."
+    with pytest.raises(ConfigError) as error:
+        find_learner("bc", "joint")
+    assert str(error.value) == "The learner 'bc' has no level 'joint'; choose subtask."
+
+
+@EVERY
+@pytest.mark.parametrize("settings", [{"steps": 0}, {"learning_rate": 0.0}, {"hidden": (0,)}])
+def test_settings_that_cannot_train_are_refused(name, settings):
+    with pytest.raises(ConfigError):
+        LEARNERS[name].make(**settings)

@@ -1,0 +1,86 @@
+"""How a policy is asked: one observation or a batch, the likeliest sub-task or a drawn one."""
+
+import numpy as np
+import pytest
+
+from policies.base import ObservationSpec
+from policies.features import decision_inputs
+from policies.networks import DecisionNetwork
+from policies.subtask_policy import SubtaskPolicy
+from teasim.constants import STATE_NAMES, SUBTASKS
+from tests.policies.fakes import SIZE, picture
+
+SPEC = ObservationSpec(("left", "cup"), SIZE, SIZE, STATE_NAMES)
+CHANCES = np.array([0.4, 0.3, 0.1, 0.1, 0.1, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def batch():
+    random = np.random.default_rng(0)
+    frames = np.stack([picture({0, 4}, random), picture(set(range(6)), random)])
+    joints = random.normal(0, 0.1, (2, len(STATE_NAMES))).astype(np.float32)
+    return {"pixels": {"left": frames, "cup": frames[::-1].copy()}, "agent_pos": joints}
+
+
+@pytest.fixture
+def policy(batch):
+    """Sure of nothing: its probabilities are CHANCES whatever it sees."""
+    n_inputs = decision_inputs(batch["pixels"], batch["agent_pos"], SPEC).shape[1]
+    network = DecisionNetwork(n_inputs, (), len(SUBTASKS), seed=0)
+    with np.errstate(divide="ignore"):
+        network.layers[0].bias.data[:] = network.layers[0].bias.new_tensor(np.log(CHANCES))
+    return SubtaskPolicy(network, SPEC, SUBTASKS)
+
+
+def first(batch):
+    pixels = {camera: frames[0] for camera, frames in batch["pixels"].items()}
+    return {"pixels": pixels, "agent_pos": batch["agent_pos"][0]}
+
+
+def test_one_observation_gives_one_action_and_a_batch_gives_many(policy, batch):
+    action, state = policy.predict(first(batch), deterministic=True)
+    assert action.shape == ()
+    assert action.dtype == np.int64
+    assert state is None
+    actions, _ = policy.predict(batch, None, np.ones(2, dtype=bool), deterministic=True)
+    assert actions.shape == (2,)
+    np.testing.assert_array_equal(actions, [0, 0])
+
+
+def test_one_observation_and_a_batch_agree(batch):
+    n_inputs = decision_inputs(batch["pixels"], batch["agent_pos"], SPEC).shape[1]
+    network = DecisionNetwork(n_inputs, (4,), len(SUBTASKS), seed=0)
+    network.layers[-1].weight.data.normal_()
+    policy = SubtaskPolicy(network, SPEC, SUBTASKS)
+    together, alone = policy.probabilities(batch), policy.probabilities(first(batch))
+    np.testing.assert_allclose(together[0], alone, rtol=1e-4)
+    assert np.abs(together[0] - together[1]).max() > 1e-6
+
+
+def test_drawn_actions_follow_the_probabilities(policy, batch):
+    many = {
+        "pixels": {camera: frames.repeat(150, 0) for camera, frames in batch["pixels"].items()},
+        "agent_pos": batch["agent_pos"].repeat(150, 0),
+    }
+    draws, _ = policy.predict(many)
+    shares = np.bincount(draws, minlength=7) / 300
+    np.testing.assert_allclose(shares, CHANCES, atol=0.07)
+    assert shares[5:].sum() == 0
+
+
+def test_a_seed_repeats_the_draws(policy, batch):
+    def draw(seed):
+        policy.set_random_seed(seed)
+        return [policy.predict(batch)[0].tolist() for _ in range(20)]
+
+    assert draw(3) == draw(3)
+    assert draw(3) != draw(4)
+
+
+def test_cameras_are_told_apart_and_frames_alone_need_no_joints(batch):
+    both = decision_inputs(batch["pixels"], None, ObservationSpec(("left", "cup"), SIZE, SIZE))
+    swapped = decision_inputs(batch["pixels"], None, ObservationSpec(("cup", "left"), SIZE, SIZE))
+    half = both.shape[1] // 2
+    assert both.dtype == np.float32
+    np.testing.assert_array_equal(both[:, :half], swapped[:, half:])
+    assert np.abs(both[:, :half] - both[:, half:]).max() > 0

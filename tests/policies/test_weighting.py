@@ -1,0 +1,91 @@
+"""A weight table meets a pool: matched by demonstration, refused when it is not the pool's."""
+
+import numpy as np
+import pytest
+
+from policies.weighting import demo_weights, weighted_moments
+from teasim.errors import ConfigError
+from teasim.pool.weight_table import WeightRow, write_weight_table
+
+
+@pytest.fixture
+def rows(fake_pool):
+    return [
+        WeightRow(
+            episode.demo_id, episode.index, 0.9 - 0.1 * i, float(i), i == 6, int(i == 6), "why"
+        )
+        for i, episode in enumerate(fake_pool.episodes)
+    ]
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(rows):
+        write_weight_table(tmp_path / "weights.csv", rows)
+        return tmp_path / "weights.csv"
+
+    return write
+
+
+def test_no_table_is_weight_1(fake_pool):
+    np.testing.assert_array_equal(demo_weights(fake_pool, None, "discard"), np.ones(7))
+
+
+@pytest.mark.parametrize(
+    ("use", "expected"),
+    [
+        ("discard", [1, 1, 1, 1, 1, 1, 0]),
+        ("weight", [0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]),
+        ("ignore", [1] * 7),
+    ],
+)
+def test_uses(fake_pool, rows, table, use, expected):
+    np.testing.assert_allclose(demo_weights(fake_pool, table(rows), use), expected, atol=1e-12)
+
+
+def test_rows_are_matched_by_demonstration_not_by_place(fake_pool, rows, table):
+    weights = demo_weights(fake_pool, table(rows[::-1]), "discard")
+    np.testing.assert_array_equal(weights, [1, 1, 1, 1, 1, 1, 0])
+
+
+def sentence(*arguments):
+    with pytest.raises(ConfigError) as error:
+        demo_weights(*arguments)
+    return str(error.value)
+
+
+def test_an_unknown_use_names_the_choices(fake_pool):
+    assert sentence(fake_pool, None, "drop") == (
+        "Unknown use 'drop' of weights; choose discard, weight, ignore."
+    )
+
+
+def test_a_table_of_another_pool_is_refused(human_pool, fake_pool, rows, table):
+    path = table(rows)
+    assert sentence(human_pool, path, "weight") == (
+        f"The weight table '{path}' is for another pool: "
+        f"it has no demonstration of '{human_pool.root}'."
+    )
+
+
+def test_a_table_that_lacks_demonstrations_is_refused(fake_pool, rows, table):
+    path = table([rows[0], *rows[3:]])
+    assert sentence(fake_pool, path, "weight") == (
+        f"The weight table '{path}' lacks 2 of the 7 demonstrations of '{fake_pool.root}', "
+        "the first is episode 1."
+    )
+
+
+def test_a_table_that_leaves_nothing_is_refused(fake_pool, rows, table):
+    path = table([WeightRow(r.demo_id, r.episode_index, 0.0, 1.0, True, 1, "") for r in rows])
+    assert sentence(fake_pool, path, "discard") == (
+        f"With use 'discard' the weight table '{path}' leaves no demonstration to learn from; "
+        "choose another use (discard, weight, ignore)."
+    )
+
+
+def test_moments_are_those_of_the_weighted_set():
+    values = np.array([[1.0], [3.0], [100.0]], dtype=np.float32)
+    mean, deviation = weighted_moments(values, np.array([0.5, 0.5, 0.0]))
+    assert mean == pytest.approx([2])
+    assert deviation == pytest.approx([1])
