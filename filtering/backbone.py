@@ -43,7 +43,8 @@ FRAME_FEATURES = 2 * (112 + 320)
 
 def _relu6(images: Tensor) -> Tensor:
     # In place: allocating the result anew costs more than computing it.
-    return functional.relu6(images, inplace=True)
+    result: Tensor = functional.relu6(images, inplace=True)
+    return result
 
 
 class SameConv(nn.Module):
@@ -156,7 +157,9 @@ def load_backbone() -> EfficientNetLite0:
         _fold(block.depthwise, stored, prefix + "_depthwise_conv", prefix + "_bn1")
         _fold(block.project, stored, prefix + "_project_conv", prefix + "_bn2")
     network.requires_grad_(False)
-    return network.eval().to(memory_format=torch.channels_last)
+    # Works in place; torch's stubs do not know that modules take a memory format.
+    network.eval().to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return network
 
 
 def describe_frames(frames: Frames) -> NDArray[np.float32]:

@@ -16,6 +16,8 @@ DIFFERENCE = 20
 """Difference from the median in any channel that makes a pixel foreground [0..255]."""
 MOG2_VARIANCE = 16.0
 """Squared Mahalanobis distance that makes a pixel foreground for MOG2 (OpenCV's default)."""
+MOG2_RATIO = 0.6
+"""Share of the overview that a pixel's background states make up; what is rarer moves."""
 
 Subtraction = Callable[[Frames, Frames], Frames]
 """Takes frames in order of time and frames spread over the whole video; returns the foreground."""
@@ -37,15 +39,17 @@ def subtract_median(frames: Frames, overview: Frames) -> Frames:
 
 
 def subtract_mog2(frames: Frames, overview: Frames) -> Frames:
-    """Grey out what OpenCV's Gaussian-mixture model, warmed up on the overview, calls background."""
+    """Grey out what OpenCV's Gaussian-mixture model, warmed up on the overview, calls still."""
     import cv2
 
     model = cv2.createBackgroundSubtractorMOG2(
-        history=len(overview) + len(frames), varThreshold=MOG2_VARIANCE, detectShadows=False
+        history=len(overview), varThreshold=MOG2_VARIANCE, detectShadows=False
     )
+    model.setBackgroundRatio(MOG2_RATIO)
     for image in overview:
         model.apply(image)
-    return _grey_out(frames, [model.apply(image) > 0 for image in frames])
+    # Learning stops here: an arm that rests for a while must not become background.
+    return _grey_out(frames, [model.apply(image, learningRate=0) > 0 for image in frames])
 
 
 def _grey_out(frames: Frames, masks: list[np.ndarray]) -> Frames:

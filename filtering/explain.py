@@ -61,11 +61,11 @@ def _findings_of(
     subtasks: Sequence[str],
 ) -> tuple[Finding, ...]:
     """Attach each omission to the step at which it was most expected, then take the rest."""
-    expected = log_p.argmax(axis=1)
+    expected = log_p.argmax(axis=1).tolist()
     total = np.where(step >= NOTABLE, step, 0.0)
     missing = np.zeros(len(step), dtype=bool)
     found = []
-    for label in np.argsort(-omission, kind="stable"):
+    for label in np.argsort(-omission, kind="stable").tolist():
         if omission[label] < NOTABLE:
             break
         row = int(log_p[:, label].argmax())
@@ -74,7 +74,7 @@ def _findings_of(
             missing[row] = True
         else:
             found.append(_finding(row, label, spans, subtasks, True, float(omission[label])))
-    for row in np.flatnonzero(total >= NOTABLE):
+    for row in np.flatnonzero(total >= NOTABLE).tolist():
         found.append(
             _finding(row, expected[row], spans, subtasks, bool(missing[row]), float(total[row]))
         )

@@ -86,7 +86,7 @@ def _grouping(weights: NDArray[np.float64], count: int) -> Grouping:
     if count == 1:
         return Grouping(groups, 0.0)
     middle = (weights[groups == 0].mean() + weights[groups == 1].mean()) / 2
-    # The mid-point of the means may fall inside a wide group; the groups decide, so keep it between.
+    # The mid-point of the means may fall inside a wide group; the groups decide: keep it between.
     lowest_kept, highest_flagged = weights[groups == 0].min(), weights[groups == 1].max()
     inside = highest_flagged < middle <= lowest_kept
     return Grouping(groups, float(middle if inside else (lowest_kept + highest_flagged) / 2))
@@ -97,7 +97,8 @@ def _assign(
 ) -> NDArray[np.int64]:
     """Return (D,) groups when the falling distinct `values` are cut before these positions."""
     bounds = values[list(cuts)] if cuts else np.empty(0)
-    return (weights[:, None] <= bounds[None, :]).sum(axis=1).astype(np.int64)
+    below: NDArray[np.bool_] = weights[:, None] <= bounds[None, :]
+    return np.count_nonzero(below, axis=1).astype(np.int64)
 
 
 def _within(weights: NDArray[np.float64], groups: NDArray[np.int64]) -> float:

@@ -32,32 +32,36 @@ class ObservationSpec:
 class DecisionSamples:
     """The decisions of a pool: what was seen before each sub-task, and which one was chosen.
 
-    A decision that was seen in k frames is k samples of share 1/k, so every decision counts once.
+    n decisions, each in V views (the frames as they were, then altered copies), K cameras.
     """
 
-    inputs: NDArray[np.float32]
-    """Features of what was seen.  # (n, F)"""
+    maps: NDArray[np.float16]
+    """Feature maps of what was seen.  # (n, V, K, C, h, w)"""
+    joints: NDArray[np.float32]
+    """Joint positions [rad; m]; J = 0 where the policy sees frames alone.  # (n, J)"""
     labels: NDArray[np.int64]
     """Chosen sub-task, an index into `action_names`.  # (n,)"""
     demos: NDArray[np.int64]
-    """Position in the pool of the demonstration the sample comes from.  # (n,)"""
-    shares: NDArray[np.float64]
-    """Share of its decision that the sample stands for, in (0, 1].  # (n,)"""
+    """Position in the pool of the demonstration the decision comes from.  # (n,)"""
     spec: ObservationSpec
-    """What the inputs were made of."""
+    """What was looked at."""
     action_names: tuple[str, ...]
     """Sub-tasks a policy chooses from, in the order of the actions."""
 
     def __post_init__(self) -> None:
         """Check that the fields belong together and make the arrays read-only."""
-        rows = {len(self.inputs), len(self.labels), len(self.demos), len(self.shares)}
-        if len(rows) != 1 or self.inputs.ndim != 2:
-            raise ValueError(f"inputs {self.inputs.shape} and the other fields differ in length")
+        arrays = (self.maps, self.joints, self.labels, self.demos)
+        if len({len(array) for array in arrays}) != 1:
+            raise ValueError(f"fields differ in length: {[len(array) for array in arrays]}")
+        if self.maps.ndim != 6 or self.maps.shape[2] != len(self.spec.cameras):
+            raise ValueError(f"maps have shape {self.maps.shape}, not (n, V, K, C, h, w)")
+        if self.joints.shape[1:] != (len(self.spec.state_names),):
+            raise ValueError(f"joints have shape {self.joints.shape}, not (n, J)")
         if len(self.labels) and not 0 <= self.labels.min() <= self.labels.max() < self.n_actions:
             raise ValueError(f"labels must lie in [0, {self.n_actions})")
-        if not np.isfinite(self.inputs).all():
-            raise ValueError("inputs hold a value that is not finite")
-        for array in (self.inputs, self.labels, self.demos, self.shares):
+        if not (np.isfinite(self.maps).all() and np.isfinite(self.joints).all()):
+            raise ValueError("an input is not finite")
+        for array in arrays:
             array.setflags(write=False)
 
     @property
@@ -66,12 +70,12 @@ class DecisionSamples:
         return len(self.action_names)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "DecisionSamples":
-        """Return the samples at `rows` (indices, repeats allowed, or a mask)."""
+        """Return the decisions at `rows` (indices, repeats allowed, or a mask)."""
         return DecisionSamples(
-            self.inputs[rows],
+            self.maps[rows],
+            self.joints[rows],
             self.labels[rows],
             self.demos[rows],
-            self.shares[rows],
             self.spec,
             self.action_names,
         )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch.nn.functional import cross_entropy
 
 from policies.base import DecisionSamples
-from policies.networks import DecisionNetwork, one_thread
+from policies.networks import DecisionNetwork, NetworkShape, one_thread
 from policies.subtask_policy import SubtaskPolicy
 from policies.weighting import weigh, weighted_loss, weighted_moments
 from teasim.errors import ConfigError
@@ -22,11 +22,11 @@ from teasim.errors import ConfigError
 class BCConfig:
     """Settings of behaviour cloning."""
 
-    hidden: tuple[int, ...] = (64,)
-    """Units of the hidden layers."""
-    steps: int = 200
-    """Full-batch gradient steps."""
-    learning_rate: float = 1e-3
+    bottleneck: int = 32
+    """Channels per camera that the feature maps are reduced to."""
+    steps: int = 120
+    """Gradient steps, each on all decisions in one of their views."""
+    learning_rate: float = 6e-3
     """Step size of AdamW."""
     weight_decay: float = 0.1
     """Decoupled weight decay of AdamW [1/step, times the learning rate]."""
@@ -37,14 +37,15 @@ class BCConfig:
         """Raise ConfigError for a value that cannot train."""
         if self.steps < 1 or self.learning_rate <= 0 or self.weight_decay < 0:
             raise ConfigError("bc needs steps >= 1, learning_rate > 0 and weight_decay >= 0.")
-        if any(units < 1 for units in self.hidden):
-            raise ConfigError(f"Every hidden layer needs a unit or more, not {self.hidden}.")
+        if self.bottleneck < 1:
+            raise ConfigError(f"bottleneck is {self.bottleneck}; choose 1 or more.")
 
 
 class BC:
     """minimise over theta: sum_i w_i [-log pi_theta(t_i | s_i)], with sum_i w_i = 1.
 
-    Full batch on one thread, so a seed and a set of weighted decisions give one result.
+    Every step takes all decisions, in one of their views after the other, on one thread: a seed and
+    a set of weighted decisions give one result.
     """
 
     policy_: SubtaskPolicy
@@ -61,10 +62,15 @@ class BC:
             ConfigError: the weights do not fit the samples, or all are 0.
         """
         samples, shares = weigh(samples, weights)
-        network = DecisionNetwork(
-            samples.inputs.shape[1], self.config.hidden, samples.n_actions, self.config.seed
+        shape = NetworkShape(
+            cameras=samples.maps.shape[2],
+            channels=samples.maps.shape[3],
+            joints=samples.joints.shape[1],
+            bottleneck=self.config.bottleneck,
+            actions=samples.n_actions,
         )
-        network.standardise(*weighted_moments(samples.inputs, shares))
+        network = DecisionNetwork(shape, self.config.seed)
+        network.standardise(weighted_moments(samples, shares))
         with one_thread():
             self.history_ = self._descend(network, samples, shares)
         self.policy_ = SubtaskPolicy(network, samples.spec, samples.action_names)
@@ -78,13 +84,14 @@ class BC:
             lr=self.config.learning_rate,
             weight_decay=self.config.weight_decay,
         )
-        inputs = torch.from_numpy(samples.inputs.copy())
+        joints = torch.from_numpy(samples.joints.copy())
         labels = torch.from_numpy(samples.labels.copy())
         weights = torch.from_numpy(shares)
         history = []
-        for _ in range(self.config.steps):
+        for step in range(self.config.steps):
+            maps = torch.from_numpy(samples.maps[:, step % samples.maps.shape[1]].copy())
             optimizer.zero_grad()
-            losses = cross_entropy(network(inputs), labels, reduction="none")
+            losses = cross_entropy(network(maps, joints), labels, reduction="none")
             loss = weighted_loss(losses, weights)
             loss.backward()
             optimizer.step()

@@ -12,7 +12,7 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
 from policies.base import ObservationSpec
-from policies.networks import DecisionNetwork
+from policies.networks import DecisionNetwork, NetworkShape
 from policies.outputs import write_bytes
 from policies.subtask_policy import SubtaskPolicy
 from teasim.errors import CheckpointError
@@ -32,7 +32,7 @@ def save_policy(policy: SubtaskPolicy, run: Path, *, training: Mapping[str, Any]
         "version": VERSION,
         "observation": asdict(policy.spec),
         "actions": policy.action_names,
-        "network": policy.network.shape(),
+        "network": asdict(policy.network.shape),
         "weights_sha256": hashlib.sha256(weights).hexdigest(),
         "training": dict(training),
     }
@@ -56,10 +56,9 @@ def load_policy(run: Path) -> SubtaskPolicy:
     try:
         spec = _spec(description["observation"])
         actions = tuple(str(name) for name in description["actions"])
-        shape = description["network"]
-        network = DecisionNetwork(
-            int(shape["inputs"]), tuple(int(units) for units in shape["hidden"]), len(actions), 0
-        )
+        network = DecisionNetwork(NetworkShape(**description["network"]), seed=0)
+        if network.shape.actions != len(actions):
+            raise ValueError("one action per output")
         network.load_state_dict(load_tensors(weights))
     except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
         raise CheckpointError(

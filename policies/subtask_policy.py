@@ -5,7 +5,7 @@ import torch
 from numpy.typing import NDArray
 
 from policies.base import Observation, ObservationSpec, RecurrentState
-from policies.features import decision_inputs
+from policies.features import Maps, camera_maps
 from policies.networks import DecisionNetwork, one_thread
 
 
@@ -29,19 +29,21 @@ class SubtaskPolicy:
         """Probability of every sub-task, (A,) for one observation and (n, A) for a batch."""
         pixels = {camera: np.asarray(observation["pixels"][camera]) for camera in self.spec.cameras}
         single = next(iter(pixels.values())).ndim == 3
-        joints = np.asarray(observation["agent_pos"]) if self.spec.state_names else None
         if single:
             pixels = {camera: frames[None] for camera, frames in pixels.items()}
-            joints = None if joints is None else joints[None]
-        chosen = self.action_probabilities(decision_inputs(pixels, joints, self.spec))
-        return chosen[0] if single else chosen
+        maps = camera_maps(pixels, self.spec.cameras)
+        joints = np.empty((len(maps), 0), dtype=np.float32)
+        if self.spec.state_names:
+            joints = np.asarray(observation["agent_pos"]).reshape(len(maps), -1)
+        chances = self.action_probabilities(maps, joints)
+        return chances[0] if single else chances
 
-    def action_probabilities(self, inputs: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Probability of every sub-task (n, A) given features (n, F)."""
+    def action_probabilities(self, maps: Maps, joints: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Probability of every sub-task (n, A) given maps (n, K, C, h, w) and joints (n, J)."""
         with torch.inference_mode(), one_thread():
-            logits = self.network(torch.from_numpy(np.array(inputs)))
-            result: NDArray[np.float64] = torch.softmax(logits, dim=1).numpy()
-        return result
+            logits = self.network(torch.from_numpy(maps.copy()), torch.from_numpy(joints.copy()))
+            chances: NDArray[np.float64] = torch.softmax(logits, dim=1).numpy()
+        return chances
 
     def predict(
         self,

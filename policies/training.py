@@ -61,6 +61,6 @@ def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int =
     seconds = time.perf_counter() - began
     return (
         f"{config.learner} on {int((weights > 0).sum())} of {len(weights)} demonstrations, "
-        f"{len(samples.labels)} samples, loss {learner.history_[-1]:.3f}, "
+        f"{len(samples.labels)} decisions, loss {learner.history_[-1]:.3f}, "
         f"{seconds:.0f} s -> {run}"
     )

@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from policies.base import DecisionSamples
+from policies.networks import Moments
 from teasim.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow, read_weight_table
@@ -61,7 +62,7 @@ def _weight(row: WeightRow, use: str) -> float:
 def weigh(
     samples: DecisionSamples, weights: NDArray[np.float64]
 ) -> tuple[DecisionSamples, NDArray[np.float64]]:
-    """Return the samples that count and the share of the total each one has, (n,) summing to 1.
+    """Return the decisions that count and the share of the total each one has, (n,), sum 1.
 
     Args:
         samples: decisions of a pool of D demonstrations.
@@ -76,22 +77,28 @@ def weigh(
         )
     if not np.isfinite(weights).all() or (weights < 0).any():
         raise ConfigError("A demonstration weight is negative or not a number.")
-    each = weights[samples.demos] * samples.shares
+    each = weights[samples.demos]
     if not each.any():
         raise ConfigError("Every demonstration has weight 0, so there is nothing to learn from.")
     counts = each > 0
     return samples.take(counts), each[counts] / each.sum()
 
 
-def weighted_loss(losses: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
-    """Mean of `losses` (n,) under `weights` (n,) that sum to 1, as `weigh` returns them."""
-    return (losses * weights).sum()
+def weighted_loss(losses: torch.Tensor, shares: torch.Tensor) -> torch.Tensor:
+    """Mean of `losses` (n,) under `shares` (n,) that sum to 1, as `weigh` returns them."""
+    return (losses * shares).sum()
 
 
-def weighted_moments(
-    values: NDArray[np.float32], weights: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean and standard deviation (F,) of `values` (n, F) under `weights` (n,) that sum to 1."""
-    mean = weights @ values.astype(np.float64)
-    variance = weights @ (values - mean) ** 2
-    return mean, np.sqrt(variance)
+def weighted_moments(samples: DecisionSamples, shares: NDArray[np.float64]) -> Moments:
+    """Mean and standard deviation of the inputs of `samples` under `shares` (n,) that sum to 1."""
+    rest = (0, 3, 4)  # views and places in the picture
+    means = np.stack([maps.mean(axis=rest, dtype=np.float64) for maps in samples.maps])
+    squares = np.stack([np.square(maps, dtype=np.float64).mean(axis=rest) for maps in samples.maps])
+    map_mean = np.tensordot(shares, means, axes=1)
+    map_variance = np.tensordot(shares, squares, axes=1) - map_mean**2
+    joints = samples.joints.astype(np.float64)
+    joint_mean = shares @ joints
+    joint_variance = shares @ (joints - joint_mean) ** 2
+    return Moments(
+        map_mean, np.sqrt(np.maximum(map_variance, 0.0)), joint_mean, np.sqrt(joint_variance)
+    )

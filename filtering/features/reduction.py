@@ -43,4 +43,5 @@ def _main_components(standardised: NDArray[np.float64]) -> NDArray[np.float64]:
     count = min(MAX_COMPONENTS, int(np.searchsorted(shares, EXPLAINED)) + 1)
     # The sign of a component is arbitrary; fix it so that printed features repeat.
     largest = right[np.arange(len(right)), np.abs(right).argmax(axis=1)]
-    return (left * strength * np.sign(largest))[:, :count]
+    components: NDArray[np.float64] = left * strength * np.sign(largest)
+    return components[:, :count]

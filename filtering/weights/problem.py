@@ -68,7 +68,8 @@ class Problem:
         residuals = np.exp(self.log_probabilities(multipliers))
         residuals[np.arange(len(residuals)), self.rows.nexts] -= 1.0
         residuals *= self.row_weights(weights)[:, None]
-        return self.rows.states.T @ residuals + self.ridge * multipliers
+        slope: Multipliers = self.rows.states.T @ residuals + self.ridge * multipliers
+        return slope
 
     def row_weights(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return w_d p(s,t|d) / sum w for every row, (R,); they sum to 1."""
@@ -92,7 +93,7 @@ class Problem:
             first.ravel(),
             jac=True,
             method="L-BFGS-B",
-            options={"maxiter": 2000, "ftol": 1e-13, "gtol": 1e-7},
+            options={"maxiter": 2000, "ftol": 1e-11, "gtol": 1e-6},
         )
         result: Multipliers = found.x.reshape(shape)
         return result

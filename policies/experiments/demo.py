@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filtering.demo_filter import DemoFilter, FilterConfig, write_filter_output
 from numpy.typing import NDArray
 
+from filtering.demo_filter import DemoFilter, FilterConfig, write_filter_output
 from filtering.report import ReportSection
 from policies.bc import BC, BCConfig
 from policies.checkpoint import save_policy

@@ -1,6 +1,6 @@
 """One arm as a skill sees it: motions are generators of targets, one per control step."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,9 +26,16 @@ from teasim.world.yumi import JOINT_SPEEDS, READY
 Motion = Iterator[np.ndarray]
 """Targets (16,) of successive control steps."""
 
+Curve = Callable[[float], SE3]
+"""Poses of the hand over a share in [0, 1]."""
+
+APPROACH = 0.07
+"""Length of the straight way in to a grasp and out again [m]."""
 SPEED_MARGIN = 0.85
 """Share of the joints' largest speeds that a plan may use."""
 _REPLANS = 4
+_REHEARSAL_SAMPLES = 12
+_LARGEST_TURN = 0.30  # more than this between two samples is a jump to another elbow position [rad]
 
 
 @dataclass(frozen=True)
@@ -60,13 +67,17 @@ class Arm:
     """Peak speed of the fastest joint in free motions [rad/s]."""
 
     def __init__(
-        self, side: str, simulation: Simulation, style: Style, posture: np.ndarray | None = None
+        self,
+        side: str,
+        simulation: Simulation,
+        style: Style,
+        postures: Sequence[Sequence[float]] = (),
     ) -> None:
         self.simulation, self.style = simulation, style
         self._side = side
-        self._posture = READY[side] if posture is None else np.asarray(posture)
         self._kinematics = kinematics(side)
-        self._kinematics.prefer(self._posture)
+        self._postures = [np.array(posture) for posture in postures] or [READY[side]]
+        self._prefer(self._postures[0])
         first = 7 * ARMS.index(side)
         self._joints = slice(first, first + 7)
         self._hand = 14 + ARMS.index(side)
@@ -110,9 +121,11 @@ class Arm:
         """Go back to READY."""
         yield from self._free(READY[self._side])
 
-    def reach(self, goal: SE3) -> Motion:
-        """Free motion, straight in joint space, to `goal`."""
-        yield from self._free(self._kinematics.solve(goal, self._posture))
+    def reach(self, goal: SE3, opening: float) -> Motion:
+        """Free motion, straight in joint space, to `goal`; the hand opens on the way."""
+        for target in self._free(self._kinematics.solve(goal, self._posture)):
+            target[self._hand] = opening
+            yield target
 
     def line(self, goal: SE3, speed: float | None = None) -> Motion:
         """Straight motion of the hand to `goal` with a peak `speed` [m/s]."""
@@ -122,7 +135,7 @@ class Arm:
         peak = max(distance / (speed or self.CARRY_SPEED), turn / self.TURN_SPEED)
         yield from self.path(lambda share: between(start, goal, share), peak * EASE_PEAK)
 
-    def path(self, curve: Callable[[float], SE3], seconds: float, *, eased: bool = True) -> Motion:
+    def path(self, curve: Curve, seconds: float, *, eased: bool = True) -> Motion:
         """Follow `curve` over [0, 1] in `seconds` at nominal tempo, slower if a joint must."""
         count = _steps(seconds / self.style.tempo)
         for _ in range(_REPLANS):
@@ -145,25 +158,57 @@ class Arm:
         other = flipped(grasp)
         return grasp if self._distance(grasp) <= self._distance(other) else other
 
-    def take(self, grasp: SE3, opening: float, back: float = 0.07) -> Motion:
-        """Open, come in along the tool's axis from `back` [m] away, and squeeze."""
-        before = shifted(grasp, -back * rotation(grasp)[:, 2])
-        yield from self._together(self.reach(before), opening)
+    def before(self, grasp: SE3) -> SE3:
+        """Where the straight way in to a grasp begins."""
+        return shifted(grasp, -APPROACH * rotation(grasp)[:, 2])
+
+    def enter(self, grasp: SE3) -> Motion:
+        """Go in to a grasp and squeeze."""
         yield from self.line(grasp, self.APPROACH_SPEED)
         yield from self.squeeze()
 
-    def release(self, opening: float, back: float = 0.07) -> Motion:
+    def take(self, grasp: SE3, opening: float) -> Motion:
+        """Reach for a grasp from where nothing is in the way, go in, and squeeze."""
+        yield from self.reach(self.before(grasp), opening)
+        yield from self.enter(grasp)
+
+    def release(self, opening: float, back: float = APPROACH) -> Motion:
         """Open by `opening` [m] and retreat along the tool's axis."""
         yield from self.hand(opening)
         yield from self.line(shifted(self.tcp, -back * rotation(self.tcp)[:, 2]), 0.2)
 
+    def choose_posture(self, curves: Sequence[Curve]) -> None:
+        """Stay near the first of the arm's postures in which all `curves` can be followed.
+
+        Raises:
+            SkillError: there is none.
+        """
+        for posture in self._postures:
+            self._prefer(posture)
+            if self._can_follow(curves):
+                return
+        raise SkillError(
+            f"The {self._side} arm finds no posture for its way; "
+            "move the object nearer to its nominal place."
+        )
+
     # -- parts -----------------------------------------------------------------------------------
 
-    def _together(self, motion: Motion, opening: float) -> Motion:
-        """Move while the hand goes to `opening`."""
-        for target in motion:
-            target[self._hand] = opening
-            yield target
+    def _prefer(self, posture: np.ndarray) -> None:
+        self._posture = posture
+        self._kinematics.prefer(posture)
+
+    def _can_follow(self, curves: Sequence[Curve]) -> bool:
+        try:
+            joints = self._kinematics.solve(curves[0](0.0), self._posture)
+            for curve in curves:
+                for share in np.linspace(0, 1, _REHEARSAL_SAMPLES + 1)[1:]:
+                    before, joints = joints, self._kinematics.solve(curve(float(share)), joints)
+                    if np.abs(joints - before).max() > _LARGEST_TURN:
+                        return False
+        except SkillError:
+            return False
+        return True
 
     def _distance(self, goal: SE3) -> float:
         try:
@@ -172,7 +217,7 @@ class Arm:
         except SkillError:
             return np.inf
 
-    def _solve(self, curve: Callable[[float], SE3], shares: np.ndarray) -> np.ndarray:
+    def _solve(self, curve: Curve, shares: np.ndarray) -> np.ndarray:
         plan, seed = [], self.joints
         for share in shares:
             seed = self._kinematics.solve(curve(float(share)), seed)

@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-import numpy as np
-
 from teasim.skills.arm import Arm, Motion, Style
 from teasim.skills.knob import turn_off_oven, turn_on_oven
 from teasim.skills.pour import add_milk, add_sugar, add_water
@@ -23,22 +21,29 @@ class Skill:
     """The arm that can reach what is needed."""
     motion: Callable[[Arm], Motion]
     """Generator of targets, from READY back to READY."""
-    posture: tuple[float, ...] | None = None
-    """Joint angles the arm stays near [rad], kinematic order; READY by default."""
+    postures: tuple[tuple[float, ...], ...] = ()
+    """Joint angles the arm may stay near [rad], kinematic order, best first; default READY."""
 
 
-# Found by random search over 20 layouts: the whole path from the grasp to the full tilt stays
+# Found by random search over 60 layouts: the whole path from the grasp to the full tilt stays
 # inside the soft limits, and no joint has to hurry. From READY the elbow runs into its limit.
-KETTLE_POSTURE = (1.61, -2.00, -1.65, 0.48, -0.81, -0.17, 1.86)
-SUGAR_POSTURE = (-0.40, -1.89, 0.97, 0.01, -0.19, 0.45, 0.82)
-MILK_POSTURE = (-1.07, -2.15, 0.75, 0.14, 1.32, 1.95, 1.56)
+KETTLE_POSTURES = ((1.61, -2.00, -1.65, 0.48, -0.81, -0.17, 1.86),)
+SUGAR_POSTURES = (
+    (-0.40, -1.89, 0.97, 0.01, -0.19, 0.45, 0.82),
+    (-0.78, -2.35, 1.04, 0.62, -0.59, 1.50, 0.21),
+)
+MILK_POSTURES = (
+    (-1.48, -2.08, 0.60, 0.65, 1.80, 1.17, 0.35),
+    (-1.36, -1.49, 2.11, 0.25, 1.04, 0.77, -0.35),
+    (-1.07, -2.15, 0.75, 0.14, 1.32, 1.95, 1.56),
+)
 
 SKILLS: Mapping[str, Skill] = MappingProxyType(
     {
         "turn_on_oven": Skill("right", turn_on_oven),
-        "add_water": Skill("right", add_water, KETTLE_POSTURE),
-        "add_sugar": Skill("left", add_sugar, SUGAR_POSTURE),
-        "add_milk": Skill("left", add_milk, MILK_POSTURE),
+        "add_water": Skill("right", add_water, KETTLE_POSTURES),
+        "add_sugar": Skill("left", add_sugar, SUGAR_POSTURES),
+        "add_milk": Skill("left", add_milk, MILK_POSTURES),
         "add_tea_bag": Skill("left", add_tea_bag),
         "stir": Skill("left", stir),
         "turn_off_oven": Skill("right", turn_off_oven),
@@ -54,7 +59,6 @@ def perform(subtask: str, simulation: Simulation, style: Style) -> Motion:
         SkillError: while iterating, when it cannot be done from the present state.
     """
     skill = SKILLS[check_subtask(subtask)]
-    posture = None if skill.posture is None else np.array(skill.posture)
-    arm = Arm(skill.arm, simulation, style, posture)
+    arm = Arm(skill.arm, simulation, style, skill.postures)
     yield from arm.wait(style.pause)
     yield from skill.motion(arm)

@@ -5,16 +5,17 @@ axis across its spout. The spout has to start beside the cup and move in as the 
 vessel's belly hits the near rim.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from mink import SE3
 
 from teasim.constants import CONTROL_TIMESTEP
 from teasim.errors import SkillError
-from teasim.skills.arm import Arm, Motion
-from teasim.skills.geometry import DOWN, UP, about, pose, position, rotation, shifted, tool
+from teasim.skills.arm import Arm, Curve, Motion
+from teasim.skills.geometry import DOWN, UP, about, between, pose, position, rotation, shifted, tool
 from teasim.world.liquids import RIM_HEIGHT
 from teasim.world.simulation import Simulation
 from teasim.world.station import NOMINAL, body_name
@@ -29,6 +30,8 @@ CUP_OUTER = 0.040
 """Outer radius of the cup [m]."""
 SPOUT_HEIGHT = 0.025
 """Height of the spout above the rim while pouring [m]; as much again before the tilt."""
+DESCENT = 0.06
+"""The hand comes down this far before it goes in to the handle [m]."""
 LONGEST_HOLD = 4.0
 """A vessel is held over the cup at most this long [s]."""
 
@@ -64,7 +67,12 @@ def pour(arm: Arm, grip: Grip) -> Motion:
     home = _vessel_pose(simulation, grip)
     if rotation(home)[2, 2] < np.cos(np.radians(15)):
         raise SkillError(f"The {grip.vessel} does not stand upright; reset the station.")
-    yield from arm.take(_grasp(simulation, grip, home), grip.opening)
+    grasp = _grasp(simulation, grip, home)
+    arm.choose_posture(rehearsal(arm, grip, home, grasp))
+    # From above: the straight way in joint space would sweep the hand through the vessel.
+    yield from arm.reach(shifted(arm.before(grasp), DESCENT * UP), grip.opening)
+    yield from arm.line(arm.before(grasp))
+    yield from arm.enter(grasp)
     yield from arm.line(shifted(arm.tcp, arm.style.lift * UP), arm.APPROACH_SPEED * 1.5)
     held = _vessel_pose(simulation, grip).inverse() @ arm.tcp  # the hand in the vessel's frame
     tilted = _over_cup(simulation, grip, held)
@@ -78,6 +86,15 @@ def pour(arm: Arm, grip: Grip) -> Motion:
     yield from arm.line(shifted(above, 0.001 * UP), arm.APPROACH_SPEED * 1.5)
     yield from arm.release(grip.opening)
     yield from arm.park()
+
+
+def rehearsal(arm: Arm, grip: Grip, home: SE3, grasp: SE3) -> list[Curve]:
+    """The way of the hand from the approach to the full tilt, as it should go."""
+    before = arm.before(grasp)
+    lifted = shifted(grasp, arm.style.lift * UP)
+    tilted = _over_cup(arm.simulation, grip, home.inverse() @ grasp)
+    stops = [shifted(before, DESCENT * UP), before, grasp, lifted, tilted(0.0)]
+    return [*(partial(between, *pair) for pair in pairwise(stops)), tilted]
 
 
 def add_water(arm: Arm) -> Motion:
@@ -108,7 +125,7 @@ def _grasp(simulation: Simulation, grip: Grip, home: SE3) -> SE3:
     return pose(handle, tool(np.cos(PITCH) * away + np.sin(PITCH) * DOWN, grip.closing * spout))
 
 
-def _over_cup(simulation: Simulation, grip: Grip, held: SE3) -> Callable[[float], SE3]:
+def _over_cup(simulation: Simulation, grip: Grip, held: SE3) -> Curve:
     """Pose of the hand for a share of the full tilt, the spout kept over the cup."""
     cup = simulation.data.body(body_name("cup")).xpos.copy()
     yaw = NOMINAL[grip.vessel].yaw

@@ -1,5 +1,7 @@
 """One running station: physics, liquids and events, advanced one control step at a time."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 
@@ -48,6 +50,8 @@ class Simulation:
         self._knob = self.model.joint("knob").qposadr[0]
         self._glow = [self.model.geom("plate").id, self.model.geom("pilot").id]
         self.target = np.zeros(16)
+        self.observers: list[Callable[[], None]] = []
+        """Called after every update, to look at the station and not to change it."""
 
     def reset(self, layout: Layout) -> None:
         """Set everything to `layout`, the arms to READY, and let things come to rest."""
@@ -80,6 +84,8 @@ class Simulation:
                 brewing=self.recogniser.bag_in_cup,
                 stirring=self.recogniser.stirring,
             )
+            for observer in self.observers:
+                observer()
 
     @property
     def events(self) -> tuple[Event, ...]:

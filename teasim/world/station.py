@@ -64,6 +64,8 @@ YAW_RANGE = np.radians(10)
 """Things are turned at most this far from their nominal yaw [rad]."""
 KNOB_RANGE = 0.015
 """The knob is moved at most this far, and never turned [m]."""
+VESSEL_GAP = 0.18
+"""Sugar pot and milk jug stand at least this far apart, for the hand at the jug's handle [m]."""
 
 IN_HOLDER = {"tea_bag": ("tea_bag_holder", 0.001, 0.0), "spoon": ("spoon_holder", 0.002, 0.10)}
 """What stands in which holder: holder, height [m], lean [rad]."""
@@ -99,13 +101,17 @@ def nominal_layout() -> Layout:
 
 
 def sample_layout(rng: np.random.Generator) -> Layout:
-    """Everything moved and turned uniformly within the stated ranges."""
-    placements = {}
-    for name, at in NOMINAL.items():
-        reach, turn = (KNOB_RANGE, 0.0) if name == "knob" else (POSITION_RANGE, YAW_RANGE)
-        dx, dy = rng.uniform(-reach, reach, size=2)
-        placements[name] = Placement(at.x + dx, at.y + dy, at.z, at.yaw + rng.uniform(-turn, turn))
-    return Layout(placements)
+    """Everything moved and turned uniformly within the stated ranges, hands fitting between."""
+    while True:
+        placements = {name: _moved(name, at, rng) for name, at in NOMINAL.items()}
+        if placements["sugar_pot"].y - placements["milk_jug"].y >= VESSEL_GAP:
+            return Layout(placements)
+
+
+def _moved(name: str, at: Placement, rng: np.random.Generator) -> Placement:
+    reach, turn = (KNOB_RANGE, 0.0) if name == "knob" else (POSITION_RANGE, YAW_RANGE)
+    dx, dy = rng.uniform(-reach, reach, size=2)
+    return Placement(at.x + dx, at.y + dy, at.z, at.yaw + rng.uniform(-turn, turn))
 
 
 def station_spec() -> mujoco.MjSpec:

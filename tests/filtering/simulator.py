@@ -1,7 +1,7 @@
 """Pools at feature level: what segments of a tea-making pool look like to a CNN, without a CNN.
 
-A segment's feature is its sub-task's mean, plus what the sub-tasks done before leave in view, plus a
-participant's offset and noise. Feature noise 1 means: as large as the distance between two sub-tasks.
+A segment's feature is its sub-task's mean, plus what the sub-tasks done before leave in view, plus
+a participant's offset and noise. Noise 1 means: as large as the distance between two sub-tasks.
 """
 
 from collections.abc import Sequence

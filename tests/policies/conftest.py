@@ -24,14 +24,19 @@ def human_pool(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def samples():
-    """30 noisy decisions among 3 sub-tasks by 5 demonstrations, the last of which errs."""
+    """30 noisy decisions among 3 sub-tasks by 5 demonstrations, the last of which errs.
+
+    One channel per sub-task is lit, somewhere in the picture of one of two cameras; two views.
+    """
     random = np.random.default_rng(0)
     labels = np.tile(np.arange(3), 10)
-    inputs = random.normal(0, 0.6, (30, 8)).astype(np.float32)
-    inputs[np.arange(30), labels] += 2
+    maps = random.normal(0, 0.3, (30, 2, 2, 4, 3, 3)).astype(np.float16)
+    for decision, label in enumerate(labels):
+        for view in range(2):
+            row, column = random.integers(0, 3, 2)
+            maps[decision, view, label % 2, label, row, column] += 3
     demos = np.repeat(np.arange(5), 6)
     labels[demos == 4] = (labels[demos == 4] + 1) % 3
-    shares = np.where(np.arange(30) % 6 < 2, 0.5, 1.0)
-    return DecisionSamples(
-        inputs, labels, demos, shares, ObservationSpec(("left",), 8, 8), tuple("abc")
-    )
+    joints = random.normal(0, 1e-3, (30, 2)).astype(np.float32)
+    spec = ObservationSpec(("left", "cup"), 48, 48, ("shoulder", "elbow"))
+    return DecisionSamples(maps, joints, labels, demos, spec, ("a", "b", "c"))

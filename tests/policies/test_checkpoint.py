@@ -24,10 +24,14 @@ def test_a_saved_policy_decides_as_before(name, samples, tmp_path):
     policy = LEARNERS[name].make(seed=0).fit(samples, np.ones(5)).policy_
     save_policy(policy, tmp_path, training={})
     loaded = load_policy(tmp_path)
+    seen = (samples.maps[:, 0], samples.joints)
     np.testing.assert_array_equal(
-        loaded.action_probabilities(samples.inputs), policy.action_probabilities(samples.inputs)
+        loaded.action_probabilities(*seen), policy.action_probabilities(*seen)
     )
     assert (loaded.spec, loaded.action_names) == (policy.spec, policy.action_names)
+
+
+SHAPE = {"cameras": 2, "channels": 4, "joints": 2, "bottleneck": 32, "actions": 3}
 
 
 def change(run, **fields):
@@ -88,8 +92,9 @@ def test_missing_weights(run):
     [
         {"actions": ["a", "b"]},
         {"network": {}},
-        {"network": {"inputs": 9, "hidden": [64]}},
-        {"network": {"inputs": 8, "hidden": "wide"}},
+        {"network": SHAPE | {"channels": 5}},
+        {"network": SHAPE | {"channels": "wide"}},
+        {"network": SHAPE | {"depth": 1}},
         {"observation": None},
     ],
 )

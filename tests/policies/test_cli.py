@@ -40,7 +40,7 @@ def test_a_policy_learns_the_fake_station_from_its_pool(run, tmp_path, capsys):
 def stirrer(run, tmp_path_factory):
     """A policy that always stirs."""
     policy = load_policy(run)
-    policy.network.layers[-1].bias.data[5] = 1e3
+    policy.network.head.bias.data[5] = 1e3
     folder = tmp_path_factory.mktemp("runs") / "stirrer"
     save_policy(policy, folder, training={})
     return folder

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+import torch
 
 from policies.base import ObservationSpec
-from policies.features import decision_inputs
-from policies.networks import DecisionNetwork
+from policies.features import camera_maps
+from policies.networks import DecisionNetwork, NetworkShape
 from policies.subtask_policy import SubtaskPolicy
 from teasim.constants import STATE_NAMES, SUBTASKS
 from tests.policies.fakes import SIZE, picture
@@ -22,13 +23,16 @@ def batch():
     return {"pixels": {"left": frames, "cup": frames[::-1].copy()}, "agent_pos": joints}
 
 
+def new_network(seed=0):
+    return DecisionNetwork(NetworkShape(2, 112, len(STATE_NAMES), 4, len(SUBTASKS)), seed)
+
+
 @pytest.fixture
-def policy(batch):
+def policy():
     """Sure of nothing: its probabilities are CHANCES whatever it sees."""
-    n_inputs = decision_inputs(batch["pixels"], batch["agent_pos"], SPEC).shape[1]
-    network = DecisionNetwork(n_inputs, (), len(SUBTASKS), seed=0)
+    network = new_network()
     with np.errstate(divide="ignore"):
-        network.layers[0].bias.data[:] = network.layers[0].bias.new_tensor(np.log(CHANCES))
+        network.head.bias.data[:] = network.head.bias.new_tensor(np.log(CHANCES))
     return SubtaskPolicy(network, SPEC, SUBTASKS)
 
 
@@ -48,9 +52,8 @@ def test_one_observation_gives_one_action_and_a_batch_gives_many(policy, batch):
 
 
 def test_one_observation_and_a_batch_agree(batch):
-    n_inputs = decision_inputs(batch["pixels"], batch["agent_pos"], SPEC).shape[1]
-    network = DecisionNetwork(n_inputs, (4,), len(SUBTASKS), seed=0)
-    network.layers[-1].weight.data.normal_()
+    network = new_network()
+    network.head.weight.data.normal_()
     policy = SubtaskPolicy(network, SPEC, SUBTASKS)
     together, alone = policy.probabilities(batch), policy.probabilities(first(batch))
     np.testing.assert_allclose(together[0], alone, rtol=1e-4)
@@ -77,10 +80,20 @@ def test_a_seed_repeats_the_draws(policy, batch):
     assert draw(3) != draw(4)
 
 
-def test_cameras_are_told_apart_and_frames_alone_need_no_joints(batch):
-    both = decision_inputs(batch["pixels"], None, ObservationSpec(("left", "cup"), SIZE, SIZE))
-    swapped = decision_inputs(batch["pixels"], None, ObservationSpec(("cup", "left"), SIZE, SIZE))
-    half = both.shape[1] // 2
-    assert both.dtype == np.float32
-    np.testing.assert_array_equal(both[:, :half], swapped[:, half:])
-    assert np.abs(both[:, :half] - both[:, half:]).max() > 0
+def test_cameras_are_told_apart(batch):
+    maps = camera_maps(batch["pixels"], ("left", "cup"))
+    swapped = camera_maps(batch["pixels"], ("cup", "left"))
+    assert maps.shape == (2, 2, 112, 4, 4)
+    np.testing.assert_array_equal(maps, swapped[:, ::-1])
+    assert np.abs(maps - swapped).max() > 0
+
+
+def test_where_things_are_does_not_matter():
+    random = np.random.default_rng(0)
+    network = new_network()
+    network.head.weight.data.normal_()
+    maps = random.normal(size=(3, 2, 112, 4, 4))
+    joints = torch.zeros(3, len(STATE_NAMES))
+    moved = np.roll(maps, (1, 2), axis=(3, 4))
+    logits = [network(torch.from_numpy(m), joints).detach() for m in (maps, moved)]
+    torch.testing.assert_close(logits[0], logits[1])

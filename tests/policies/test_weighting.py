@@ -84,8 +84,12 @@ def test_a_table_that_leaves_nothing_is_refused(fake_pool, rows, table):
     )
 
 
-def test_moments_are_those_of_the_weighted_set():
-    values = np.array([[1.0], [3.0], [100.0]], dtype=np.float32)
-    mean, deviation = weighted_moments(values, np.array([0.5, 0.5, 0.0]))
-    assert mean == pytest.approx([2])
-    assert deviation == pytest.approx([1])
+def test_moments_are_those_of_the_weighted_set(samples):
+    shares = np.where(samples.demos < 2, 1 / 12, 0.0)
+    moments = weighted_moments(samples, shares)
+    maps = samples.maps[samples.demos < 2].astype(np.float64)
+    joints = samples.joints[samples.demos < 2].astype(np.float64)
+    np.testing.assert_allclose(moments.map_mean, maps.mean(axis=(0, 1, 4, 5)), atol=1e-12)
+    np.testing.assert_allclose(moments.map_deviation, maps.std(axis=(0, 1, 4, 5)), atol=1e-12)
+    np.testing.assert_allclose(moments.joint_mean, joints.mean(axis=0), atol=1e-12)
+    np.testing.assert_allclose(moments.joint_deviation, joints.std(axis=0), atol=1e-12)

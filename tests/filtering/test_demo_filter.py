@@ -1,0 +1,124 @@
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from filtering.demo_filter import DemoFilter, FilterConfig
+from filtering.segmentation.segmenter import segmenter_named
+from teasim.errors import ConfigError, PoolError
+from teasim.pool import Pool
+from tests.filtering.conftest import TOY_SEQUENCES
+from tests.toy_pool import SEQ_1, make_toy_pool, strip_ground_truth
+
+WRONG = [sequence != SEQ_1 for sequence in TOY_SEQUENCES]
+
+
+def test_incorrect_demonstrations_are_flagged_with_the_right_reason(
+    toy_filter: DemoFilter,
+) -> None:
+    assert toy_filter.flagged_.tolist() == WRONG
+    assert "'add_water' was expected, 'stir' was seen" in toy_filter.reasons_[2]
+    assert "After add_milk" in toy_filter.reasons_[5]
+    assert "'turn_off_oven' is missing" in toy_filter.reasons_[5]
+    assert [bool(reason) for reason in toy_filter.reasons_] == WRONG
+
+
+def test_weights_lie_in_0_1_and_trust_sums_to_half_of_the_pool(toy_filter: DemoFilter) -> None:
+    assert ((toy_filter.weights_ >= 0) & (toy_filter.weights_ <= 1)).all()
+    assert toy_filter.trust_.sum() == pytest.approx(len(WRONG) / 2, abs=1e-6)
+    assert (toy_filter.groups_ == 0).tolist() == [not wrong for wrong in WRONG]
+
+
+def test_fitting_again_changes_nothing(toy_filter: DemoFilter, toy_pool: Pool) -> None:
+    again = DemoFilter(toy_filter.config).fit(toy_pool).fit(toy_pool, jobs=2)
+    assert again.table() == toy_filter.table()
+
+
+def test_the_filter_never_reads_the_ground_truth(
+    toy_filter: DemoFilter, toy_pool: Pool, tmp_path: Path
+) -> None:
+    stripped = strip_ground_truth(shutil.copytree(toy_pool.root, tmp_path / "stripped"))
+    assert all(episode.record is None for episode in stripped.episodes)
+    assert DemoFilter().fit(stripped).table() == toy_filter.table()
+
+
+def test_with_one_group_nothing_is_flagged(toy_pool: Pool) -> None:
+    found = DemoFilter(FilterConfig(groups="1")).fit(toy_pool)
+    assert not found.flagged_.any()
+    assert found.threshold_ == 0.0
+
+
+def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
+    full = ("cut", "fry", "serve")
+    pool = make_toy_pool(
+        tmp_path / "cook", [full] * 4 + [("cut", "serve")], frames_per_subtask=3, cameras=("main",)
+    )
+    found = DemoFilter().fit(pool)
+    assert found.cameras_ == ("main",)
+    assert found.flagged_.tolist() == [False] * 4 + [True]
+    assert "'fry' is missing" in found.reasons_[-1]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"segmenter": "clustering"}, "Unknown segmenter 'clustering'; choose truth."),
+        ({"solver": "exact"}, "Unknown solver 'exact'; choose annealed."),
+        ({"groups": "7"}, "Unknown number of groups '7'; choose auto, 1, 2, 3."),
+        (
+            {"background": "flow"},
+            "Unknown background subtraction 'flow'; choose none, median, mog2.",
+        ),
+        ({"frames_per_segment": 0}, "frames_per_segment is 0; choose 1 or more."),
+        ({"trusted_share": 1.0}, "trusted_share is 1.0; choose a share between 0 and 1."),
+        ({"ridge": 0.0}, "ridge is 0.0; choose a number above 0."),
+    ],
+)
+def test_settings_out_of_range_are_refused(change: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        replace(FilterConfig(), **change)  # type: ignore[arg-type]
+    assert str(caught.value) == message
+
+
+def test_unknown_camera_is_refused_with_the_choices(toy_pool: Pool) -> None:
+    with pytest.raises(ConfigError) as caught:
+        DemoFilter(FilterConfig(cameras=("roof",))).fit(toy_pool)
+    assert str(caught.value) == "The pool has no camera 'roof'; choose from left, cup."
+
+
+def test_too_small_pools_are_refused(tmp_path: Path) -> None:
+    pool = make_toy_pool(tmp_path / "two", [SEQ_1] * 2, frames_per_subtask=2)
+    with pytest.raises(ConfigError, match=r"has 2 demonstrations; a filter needs 3 or more\.$"):
+        DemoFilter().fit(pool)
+
+
+class _Unlabelled:
+    subtasks = ("a", "b")
+    root = Path("somewhere")
+
+    class _Episode:
+        index = 4
+        length = 10
+
+        def spans(self) -> tuple[()]:
+            return ()
+
+    episodes = (_Episode(),)
+
+
+def test_truth_needs_labels() -> None:
+    with pytest.raises(PoolError) as caught:
+        segmenter_named("truth")(_Unlabelled())  # type: ignore[arg-type]
+    assert str(caught.value) == (
+        "Demonstration 4 has no labelled sub-tasks, which the segmenter 'truth' needs "
+        "(column subtask_index)."
+    )
+
+
+def test_segment_labels_are_numbers_of_the_pools_subtasks(toy_pool: Pool) -> None:
+    found = segmenter_named("truth")(toy_pool)
+    for labels, sequence in zip(found.labels(), TOY_SEQUENCES, strict=True):
+        assert [found.subtasks[label] for label in labels] == list(sequence)
+    assert np.max([max(labels) for labels in found.labels()]) < len(found.subtasks)
