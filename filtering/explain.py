@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from filtering.sequence import Transitions
 from filtering.weights.score import Score
@@ -41,43 +42,74 @@ def find_strange_steps(
     subtasks: Sequence[str],
 ) -> list[tuple[Finding, ...]]:
     """Return per demonstration its findings of NOTABLE surprise or more, the worst first."""
+    order = usual_order(rows, score.weights)
     return [
-        _findings_of(
-            score.log_probabilities[rows.demos == demo],
-            score.step[rows.demos == demo],
-            score.omission[demo],
-            spans,
-            subtasks,
-        )
+        _findings_of(_Steps(rows, score, demo), spans, order, subtasks)
         for demo, spans in enumerate(segments)
     ]
 
 
+def usual_order(rows: Transitions, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (T, T): how often sub-task a first comes before b where both occur, 0.5 if never.
+
+    Args:
+        rows: the pool.
+        weights: (D,) how much each demonstration counts.
+    """
+    before = np.full((rows.n_subtasks, rows.n_subtasks), 0.5)
+    both = np.ones_like(before)
+    for demo in range(rows.n_demos):
+        labels = rows.nexts[rows.demos == demo][:-1].tolist()
+        first = np.full(rows.n_subtasks, np.inf)
+        for position in range(len(labels) - 1, -1, -1):
+            first[labels[position]] = position
+        occurs = np.isfinite(first)
+        both += weights[demo] * (occurs[:, None] & occurs[None, :])
+        before += weights[demo] * ((first[:, None] < first[None, :]) & occurs[None, :])
+    return before / both
+
+
+class _Steps:
+    """What the score says about one demonstration."""
+
+    def __init__(self, rows: Transitions, score: Score, demo: int) -> None:
+        mine = rows.demos == demo
+        self.labels: list[int] = rows.nexts[mine][:-1].tolist()
+        self.expected: list[int] = score.log_probabilities[mine].argmax(axis=1).tolist()
+        self.surprise: list[float] = score.step[mine].tolist()
+        omission = score.omission[demo]
+        self.omitted = {
+            label: float(omission[label]) for label in np.flatnonzero(omission >= NOTABLE).tolist()
+        }
+
+    def place_of(self, omitted: int, order: NDArray[np.float64]) -> int:
+        """Return the row at which most of the other sub-tasks say an omitted one belongs."""
+        agreement = [
+            sum(order[label, omitted] for label in self.labels[:row])
+            + sum(order[omitted, label] for label in self.labels[row:])
+            for row in range(len(self.labels) + 1)
+        ]
+        return int(np.argmax(agreement))
+
+
 def _findings_of(
-    log_p: np.ndarray,
-    step: np.ndarray,
-    omission: np.ndarray,
-    spans: tuple[Span, ...],
-    subtasks: Sequence[str],
+    steps: _Steps, spans: tuple[Span, ...], order: NDArray[np.float64], subtasks: Sequence[str]
 ) -> tuple[Finding, ...]:
-    """Attach each omission to the step at which it was most expected, then take the rest."""
-    expected = log_p.argmax(axis=1).tolist()
-    total = np.where(step >= NOTABLE, step, 0.0)
-    missing = np.zeros(len(step), dtype=bool)
+    """Join each omission to the strange step at its place, if it is what was expected there."""
     found = []
-    for label in np.argsort(-omission, kind="stable").tolist():
-        if omission[label] < NOTABLE:
-            break
-        row = int(log_p[:, label].argmax())
-        if expected[row] == label:
-            total[row] = step[row] + omission[label]
-            missing[row] = True
-        else:
-            found.append(_finding(row, label, spans, subtasks, True, float(omission[label])))
-    for row in np.flatnonzero(total >= NOTABLE).tolist():
-        found.append(
-            _finding(row, expected[row], spans, subtasks, bool(missing[row]), float(total[row]))
-        )
+    explained = set()
+    for label, omission in steps.omitted.items():
+        row = steps.place_of(label, order)
+        surprise = omission
+        if steps.expected[row] == label:
+            surprise += steps.surprise[row]
+            explained.add(row)
+        found.append(_finding(row, label, spans, subtasks, True, surprise))
+    for row, surprise in enumerate(steps.surprise):
+        if surprise >= NOTABLE and row not in explained:
+            label = steps.expected[row]
+            missing = label in steps.omitted
+            found.append(_finding(row, label, spans, subtasks, missing, surprise))
     return tuple(sorted(found, key=lambda finding: -finding.surprise))
 
 
@@ -108,13 +140,14 @@ def explain(findings: Sequence[Finding], fps: float) -> str:
             "kept demonstrations."
         )
     # One displaced step makes later steps strange as well: of those that matter, name the first.
-    worst = min(gravest(findings), key=lambda item: item.frame)
+    worst = min(gravest(findings), key=lambda item: (item.frame, -item.surprise))
     sentence = f"{_place(worst, fps)} {_expectation(worst)}, {_sight(worst, fps)}"
     if worst.missing:
         sentence += f"; '{worst.expected}' is missing from the whole video"
-    others = [item for item in findings if item.missing and item is not worst]
+    others = {item.expected: item for item in reversed(findings) if item.missing}
+    others.pop(worst.expected, None)
     if others:
-        where = ", ".join(f"'{item.expected}' (expected at {_at(item, fps)})" for item in others)
+        where = ", ".join(f"'{item.expected}' (expected at {_at(item, fps)})" for item in others.values())
         sentence += f"; {'also missing' if worst.missing else 'missing'}: {where}"
     return sentence + "."
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Observation = Mapping[str, Any]
-"""One of `TeaMakingSubtasks-v0`: `pixels` (camera -> (H, W, 3) uint8) and `agent_pos` (J,)."""
+"""One of `TeaMakingSubtasks-v0`: `pixels` ((H, W, 3) uint8 per camera) and `agent_pos` (J,)."""
 
 RecurrentState = tuple[NDArray[np.float32], ...]
 """What a policy with a memory carries from one decision to the next."""
@@ -79,6 +79,17 @@ class DecisionSamples:
             self.spec,
             self.action_names,
         )
+
+
+def pictures(observation: Observation, cameras: tuple[str, ...]) -> dict[str, NDArray[np.uint8]]:
+    """Return the frame or batch of frames of each of `cameras`.
+
+    With one camera `pixels` is that camera's picture, with several a picture per name.
+    """
+    pixels = observation["pixels"]
+    if isinstance(pixels, Mapping):
+        return {camera: np.asarray(pixels[camera]) for camera in cameras}
+    return {cameras[0]: np.asarray(pixels)}
 
 
 class Policy(Protocol):

@@ -1,8 +1,8 @@
 """What a policy computes from frames: the feature maps of the pretrained network.
 
 A decision hangs on small things (milk in the cup, sugar in the pot, a glowing plate), so the maps
-are kept at stride 16 and not pooled here. The network is frozen and is the filter's own; this is the
-one module of the learners that imports from `filtering`, and it takes nothing else from there.
+are kept at stride 16 and not pooled here. The network is frozen and is the filter's own; this is
+the one module of the learners that imports from `filtering`, and it takes nothing else from there.
 """
 
 from collections.abc import Mapping

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.base import Observation, ObservationSpec, Policy
+from policies.base import Observation, ObservationSpec, Policy, pictures
 from teasim.errors import CheckpointError, ConfigError
 from teasim.pool.videos import VideoWriter
 
@@ -149,7 +149,7 @@ def _judge(choice: int, info: Mapping[str, Any]) -> Action:
 
 def _picture(observation: Observation, policy: Policy) -> NDArray[np.uint8]:
     """All cameras side by side, (H, cameras * W, 3)."""
-    return np.hstack([observation["pixels"][camera] for camera in policy.spec.cameras])
+    return np.hstack(list(pictures(observation, policy.spec.cameras).values()))
 
 
 def _write_video(path: Path, frames: list[NDArray[np.uint8]]) -> None:

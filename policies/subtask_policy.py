@@ -4,7 +4,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from policies.base import Observation, ObservationSpec, RecurrentState
+from policies.base import Observation, ObservationSpec, RecurrentState, pictures
 from policies.features import Maps, camera_maps
 from policies.networks import DecisionNetwork, one_thread
 
@@ -27,7 +27,7 @@ class SubtaskPolicy:
 
     def probabilities(self, observation: Observation) -> NDArray[np.float64]:
         """Probability of every sub-task, (A,) for one observation and (n, A) for a batch."""
-        pixels = {camera: np.asarray(observation["pixels"][camera]) for camera in self.spec.cameras}
+        pixels = pictures(observation, self.spec.cameras)
         single = next(iter(pixels.values())).ndim == 3
         if single:
             pixels = {camera: frames[None] for camera, frames in pixels.items()}

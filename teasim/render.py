@@ -15,7 +15,7 @@ from teasim.world.simulation import Simulation
 
 STREAM_RADIUS = 0.003
 """Radius of a stream in the picture [m]."""
-SHADOW_MAP = 2048
+SHADOW_MAP = 4096
 """Side of the shadow map in `nice` quality [pixels]."""
 _SHOWN_GROUPS = (0, 1, 2)
 
@@ -75,7 +75,12 @@ class StationRenderer:
         self._simulation.paint()
         return {camera: self._frame(camera) for camera in cameras}
 
-    def _frame(self, camera: str) -> np.ndarray:
+    def picture(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
+        """One (height, width, 3) uint8 RGB picture from a named camera or from anywhere."""
+        self._simulation.paint()
+        return self._frame(camera)
+
+    def _frame(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
         self._renderer.update_scene(
             self._simulation.data, camera=camera, scene_option=self._option
         )

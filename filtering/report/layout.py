@@ -53,7 +53,8 @@ def place_dots(weights: Sequence[float]) -> list[Dot]:
 def place_marks(marks: Sequence[_HasPlace], longest: float) -> list[PlacedMark]:
     """Put the texts of marks on lines so that they do not overlap."""
     placed: list[PlacedMark] = []
-    for mark in sorted(marks, key=lambda item: item.second):
+    # From right to left: an earlier mark stands higher, so no line runs through a text.
+    for mark in sorted(marks, key=lambda item: -item.second):
         left = 100.0 * mark.second / longest
         turned = left > 100.0 - MARK_WIDTH
         taken = {other.level for other in placed if abs(other.left - left) < 2 * MARK_WIDTH}

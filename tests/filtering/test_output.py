@@ -115,5 +115,6 @@ def test_dots_never_cover_each_other() -> None:
 
 def test_marks_that_are_close_stand_on_different_lines() -> None:
     placed = place_marks([Mark(1.0, "a"), Mark(1.5, "b"), Mark(9.9, "c")], 10.0)
-    assert [item.level for item in placed] == [0, 1, 0]
-    assert [item.turned for item in placed] == [False, False, True]
+    assert [item.mark.text for item in placed] == ["c", "b", "a"]
+    assert [item.level for item in placed] == [0, 0, 1]
+    assert [item.turned for item in placed] == [True, False, False]

@@ -1,0 +1,212 @@
+"""What Gymnasium, Stable-Baselines3 and users of both environments rely on."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as check_env_sb3
+
+from teasim.constants import CAMERAS, SUBTASKS
+from teasim.envs.registration import register_envs
+from teasim.errors import ConfigError
+from tests.envs.fingerprint import fingerprint
+
+ROOT = Path(__file__).parents[2]
+NAMES = ("TeaMaking", "TeaMakingSubtasks")
+ONE_CAMERA = {"cameras": ("cup",), "width": 64, "height": 64}
+VIEWS = {
+    "state": {"obs_type": "state"},
+    "pixels": {"obs_type": "pixels", **ONE_CAMERA},
+    "pixels_agent_pos": {"obs_type": "pixels_agent_pos", **ONE_CAMERA},
+}
+SEVERAL = {"obs_type": "pixels_agent_pos", "width": 64, "height": 64}
+INFO = {
+    "success": bool,
+    "is_success": bool,
+    "subtasks": tuple,
+    "subtasks_done": tuple,
+    "correct_action": int,
+    "allowed_actions": tuple,
+    "violations": tuple,
+    "unsafe": bool,
+}
+
+each_env = pytest.mark.parametrize("name", NAMES)
+
+
+@each_env
+@pytest.mark.parametrize("view", VIEWS)
+def test_the_checkers_of_gymnasium_and_stable_baselines_find_nothing(make, name, view):
+    env = make(name, render_mode="rgb_array", **VIEWS[view])
+    check_env(env.unwrapped)
+    check_env_sb3(env.unwrapped)
+
+
+@each_env
+def test_the_checker_of_gymnasium_finds_nothing_with_several_cameras(make, name):
+    # Stable-Baselines3 knows no dict within a dict.
+    check_env(make(name, render_mode="rgb_array", **SEVERAL).unwrapped)
+
+
+@each_env
+@pytest.mark.parametrize("view", [*VIEWS, "several"])
+def test_observations_are_finite_new_and_as_announced(make, name, view):
+    env = make(name, **VIEWS.get(view, SEVERAL))
+    first, _ = env.reset(seed=0)
+    second, *_ = env.step(env.action_space.sample())
+    assert first in env.observation_space
+    assert second in env.observation_space
+    ours, theirs = leaves(first), leaves(second)
+    assert ours.keys() == theirs.keys()
+    for key in ours:
+        assert np.isfinite(ours[key]).all()
+        assert np.ptp(ours[key]) > 0, key
+        assert not np.shares_memory(ours[key], theirs[key])
+
+
+def leaves(observation: dict, path: str = "") -> dict[str, np.ndarray]:
+    """All arrays of a nested observation by their path."""
+    found: dict[str, np.ndarray] = {}
+    for key, value in observation.items():
+        if isinstance(value, dict):
+            found |= leaves(value, f"{path}{key}/")
+        else:
+            found[f"{path}{key}"] = value
+    return found
+
+
+@each_env
+def test_observation_keys_are_the_conventional_ones(make, name):
+    spaces = {view: make(name, **kwargs).observation_space for view, kwargs in VIEWS.items()}
+    assert set(spaces["state"].spaces) == {"agent_pos", "environment_state"}
+    assert set(spaces["pixels"].spaces) == {"pixels"}
+    assert set(spaces["pixels_agent_pos"].spaces) == {"agent_pos", "pixels"}
+    assert spaces["pixels"]["pixels"].shape == (64, 64, 3)
+    several = make(name, cameras=CAMERAS, **SEVERAL).observation_space
+    assert tuple(several["pixels"].spaces) == CAMERAS
+
+
+@each_env
+def test_the_initial_state_varies_with_the_seed_and_only_with_it(make, name):
+    env = make(name)
+    states = [env.reset(seed=seed)[0]["environment_state"] for seed in (0, 1, 0)]
+    assert states[0].tobytes() == states[2].tobytes()
+    assert np.abs(states[0] - states[1]).max() > 0.005
+    assert env.reset()[0]["environment_state"].tobytes() != states[2].tobytes()
+
+
+@each_env
+def test_without_randomize_everything_is_in_its_nominal_place(make, name):
+    env = make(name, randomize=False)
+    states = [env.reset(seed=seed)[0]["environment_state"] for seed in (0, 1)]
+    assert states[0].tobytes() == states[1].tobytes()
+
+
+@each_env
+def test_infos_hold_what_policies_are_scored_by(make, name):
+    env = make(name)
+    _, info = env.reset(seed=0)
+    assert {key: type(info[key]) for key in INFO} == INFO
+    assert info["subtasks"] == SUBTASKS
+    assert info["subtasks_done"] == ()
+    assert info["correct_action"] == SUBTASKS.index("turn_on_oven")
+    assert info["allowed_actions"] == (info["correct_action"],)
+
+
+@pytest.mark.parametrize(
+    ("name", "actions", "obs_type"),
+    [("TeaMaking", 5, "pixels_agent_pos"), ("TeaMakingSubtasks", 2, "state")],
+)
+def test_another_process_sees_the_same_bits(name, actions, obs_type):
+    command = [sys.executable, "-m", "tests.envs.fingerprint", name, str(actions), obs_type]
+    theirs = subprocess.check_output(command, cwd=ROOT, text=True)
+    assert theirs.strip() == fingerprint(name, actions, obs_type)
+
+
+@each_env
+def test_vector_environments_are_copies_of_the_single_one(make, name):
+    register_envs()
+    vector = gymnasium.make_vec(f"teasim/{name}-v0", num_envs=2, vectorization_mode="sync")
+    observations, _ = vector.reset(seed=3)
+    actions = np.stack([vector.single_action_space.sample() * 0 for _ in range(2)])
+    stepped, _, terminated, truncated, _ = vector.step(actions)
+    vector.close()
+    env = make(name)
+    for k in range(2):
+        single, _ = env.reset(seed=3 + k)
+        assert (
+            observations["environment_state"][k].tobytes() == single["environment_state"].tobytes()
+        )
+        after, *_ = env.step(actions[k])
+        assert stepped["agent_pos"][k].tobytes() == after["agent_pos"].tobytes()
+    assert not (terminated | truncated).any()
+
+
+@each_env
+def test_pictures_are_those_of_the_first_camera(make, name):
+    view = {"obs_type": "pixels", "width": 64, "height": 48}
+    env = make(name, render_mode="rgb_array", cameras=("cup", "left"), **view)
+    observation, _ = env.reset(seed=0)
+    picture = env.render()
+    assert (picture.shape, picture.dtype) == ((48, 64, 3), np.uint8)
+    assert (picture == observation["pixels"]["cup"]).all()
+    assert (picture != observation["pixels"]["left"]).any()
+
+
+@each_env
+def test_closing_twice_is_harmless_and_pictures_come_back(make, name):
+    env = make(name, render_mode="rgb_array", obs_type="pixels", **ONE_CAMERA)
+    before, _ = env.reset(seed=0)
+    env.close()
+    env.close()
+    after, _ = env.reset(seed=0)
+    assert (before["pixels"] == after["pixels"]).all()
+    assert env.metadata["render_fps"] == 10
+
+
+@each_env
+def test_there_is_no_picture_without_a_render_mode(make, name):
+    env = make(name).unwrapped
+    env.reset(seed=0)
+    assert env.render() is None
+
+
+@pytest.mark.parametrize("start", ["import teasim", "import gymnasium, teasim", ""])
+def test_the_environments_are_found_however_teasim_was_imported(start):
+    program = f"{start}\nimport gymnasium\ngymnasium.make('teasim:teasim/TeaMaking-v0')"
+    subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True)
+
+
+BAD = {
+    "obs_type": ("smell", "Unknown obs_type 'smell'; choose state, pixels, pixels_agent_pos."),
+    "cameras": (("back",), "Unknown camera 'back'; choose left, cup, front, top."),
+    "render_mode": ("human", "Unknown render_mode 'human'; choose None or rgb_array."),
+    "quality": ("great", "Unknown quality 'great'; choose fast, nice."),
+    "width": (0, "The pictures are 0 x 64 pixels; choose sides from 1 to 1280 by 960."),
+    "max_actions": (0, "max_actions is 0; choose 1 or more."),
+}
+
+
+@each_env
+@pytest.mark.parametrize("key", BAD)
+@pytest.mark.filterwarnings("ignore::UserWarning")  # Gymnasium's own words about render modes
+def test_a_bad_argument_is_named_with_the_choices(make, name, key):
+    if key == "max_actions" and name == "TeaMaking":
+        pytest.skip("the joint level counts seconds, not actions")
+    value, sentence = BAD[key]
+    with pytest.raises(ConfigError) as error:
+        make(name, **(VIEWS["pixels"] | {key: value}))
+    assert str(error.value) == sentence
+
+
+@each_env
+@pytest.mark.parametrize("cameras", [(), ("cup", "cup")])
+def test_every_camera_is_named_once(make, name, cameras):
+    sentence = "Name each camera once, at least one of left, cup, front, top."
+    with pytest.raises(ConfigError) as error:
+        make(name, obs_type="pixels", cameras=cameras)
+    assert str(error.value) == sentence

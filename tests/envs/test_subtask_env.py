@@ -1,0 +1,70 @@
+"""Whole sub-tasks as actions."""
+
+import pytest
+
+from teasim.constants import SUBTASKS
+from teasim.task.recipes import SEQ_1
+
+TURN_ON, ADD_WATER, _, _, ADD_TEA_BAG, STIR, TURN_OFF = range(7)
+
+
+@pytest.mark.slow
+def test_following_the_correct_action_makes_tea_in_seven(make):
+    env = make("TeaMakingSubtasks")
+    _, info = env.reset(seed=21)
+    actions, rewards = [], []
+    while not info["success"] and len(actions) < 14:
+        action = info["correct_action"]
+        assert action in info["allowed_actions"]
+        assert info["unsafe"] == ("turn_on_oven" in actions and "turn_off_oven" not in actions)
+        _, reward, terminated, truncated, info = env.step(action)
+        actions.append(SUBTASKS[action])
+        rewards.append(reward)
+    assert tuple(actions) == SEQ_1
+    assert rewards == [0.0] * 6 + [1.0]
+    assert (terminated, truncated) == (True, False)
+    assert info["subtasks_done"] == SEQ_1
+    assert (info["correct_action"], info["allowed_actions"], info["violations"]) == (-1, (), ())
+    assert (info["is_success"], info["unsafe"], info["refused"]) == (True, False, "")
+
+
+def test_a_second_tea_bag_is_refused_and_said_so(make):
+    env = make("TeaMakingSubtasks")
+    env.reset(seed=0)
+    *_, first = env.step(ADD_TEA_BAG)
+    observation, reward, terminated, truncated, info = env.step(ADD_TEA_BAG)
+    assert first["refused"] == ""
+    assert info["refused"] == "The tea bag is in the cup already; choose another sub-task."
+    assert (reward, terminated, truncated) == (0, False, False)
+    assert info["subtasks_done"] == ("add_tea_bag",)
+    assert info["time"] == pytest.approx(first["time"] + 1.0)
+    assert observation in env.observation_space
+
+
+def test_a_break_of_the_precedence_is_written_down_and_the_oven_is_unsafe(make):
+    env = make("TeaMakingSubtasks")
+    env.reset(seed=0)
+    *_, info = env.step(ADD_WATER)
+    assert info["violations"] == ("add_water_before_turn_off_oven",)
+    assert info["correct_action"] == TURN_ON
+    *_, info = env.step(TURN_ON)
+    assert info["unsafe"]
+    assert TURN_OFF in info["allowed_actions"]
+    assert STIR not in info["allowed_actions"]
+
+
+def test_the_number_of_actions_is_limited(make):
+    env = make("TeaMakingSubtasks", max_actions=2)
+    for _ in range(2):
+        env.reset(seed=0)
+        *_, truncated, _ = env.step(TURN_ON)
+        assert not truncated
+        _, _, terminated, truncated, info = env.step(TURN_OFF)
+        assert (terminated, truncated, info["success"]) == (False, True, False)
+
+
+def test_the_robot_is_at_ready_and_at_rest_at_every_decision(make):
+    env = make("TeaMakingSubtasks")
+    start, _ = env.reset(seed=0)
+    later, *_ = env.step(TURN_ON)
+    assert later["agent_pos"] == pytest.approx(start["agent_pos"], abs=0.01)
