@@ -147,7 +147,9 @@ def explain(findings: Sequence[Finding], fps: float) -> str:
     others = {item.expected: item for item in reversed(findings) if item.missing}
     others.pop(worst.expected, None)
     if others:
-        where = ", ".join(f"'{item.expected}' (expected at {_at(item, fps)})" for item in others.values())
+        where = ", ".join(
+            f"'{item.expected}' (expected at {_at(item, fps)})" for item in others.values()
+        )
         sentence += f"; {'also missing' if worst.missing else 'missing'}: {where}"
     return sentence + "."
 

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-HISTORY_SCALE = 0.5
+HISTORY_SCALE = 1.0
 """Length of a finished sub-task's entry in the history block [relative to a segment's feature].
 
-Below 1 the ridge holds the history back: what is in view decides unless it leaves a choice."""
+At 1 the ridge holds both back alike: what is in view decides, and history where the view leaves a
+choice (turning the oven on and off look the same)."""
 
 
 @dataclass(frozen=True)

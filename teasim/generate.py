@@ -248,12 +248,12 @@ def _verdict(simulation: Simulation) -> Verdict:
 def _episode_record(demo: DemoPlan, positions: Sequence[int], seed: int) -> EpisodeRecord:
     at = np.asarray(positions)
     starts = [*(int(np.argmax(at == k)) for k in range(len(demo.plan.steps))), len(at)]
-    spans = tuple(
-        Span(name, starts[k], starts[k + 1]) for k, name in enumerate(demo.plan.steps)
-    )
+    spans = tuple(Span(name, starts[k], starts[k + 1]) for k, name in enumerate(demo.plan.steps))
     mistakes = sorted(
-        (MistakeSpan(m.name, m.subtask, starts[m.position], starts[m.position])
-         for m in demo.plan.mistakes),
+        (
+            MistakeSpan(m.name, m.subtask, starts[m.position], starts[m.position])
+            for m in demo.plan.mistakes
+        ),
         key=lambda span: (span.start, span.subtask),
     )
     return EpisodeRecord(

@@ -45,7 +45,7 @@ def run(
     pickled. `progress` None means: a bar when stderr is a terminal.
 
     Raises:
-        ConfigError: `backend` is unknown or its package is not installed, or `jobs` is not positive.
+        ConfigError: `backend` is unknown or not installed, or `jobs` is not positive.
     """
     if jobs < 1:
         raise ConfigError(f"jobs is {jobs}; choose 1 or more.")

@@ -17,6 +17,8 @@ STREAM_RADIUS = 0.003
 """Radius of a stream in the picture [m]."""
 SHADOW_MAP = 4096
 """Side of the shadow map in `nice` quality [pixels]."""
+LARGEST_SIDE = 4096
+"""Largest width and height of a picture [pixels]."""
 _SHOWN_GROUPS = (0, 1, 2)
 
 
@@ -33,15 +35,16 @@ class StationRenderer:
         """Start OpenGL.
 
         Raises:
-            ConfigError: unknown quality.
+            ConfigError: unknown quality, or a side out of range.
             RenderError: no headless back end works.
         """
-        if quality not in QUALITIES:
-            raise ConfigError(f"Unknown quality '{quality}'; choose {', '.join(QUALITIES)}.")
+        check_look(width, height, quality)
         choose_gl()
         self._simulation = simulation
         self._model = simulation.model
         self._set_quality(quality)
+        buffer = self._model.vis.global_  # a larger one would have to be cleared every time
+        buffer.offwidth, buffer.offheight = width, height
         try:
             self._renderer = mujoco.Renderer(self._model, height, width)
         except Exception as error:  # every back end fails in its own way
@@ -81,9 +84,7 @@ class StationRenderer:
         return self._frame(camera)
 
     def _frame(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
-        self._renderer.update_scene(
-            self._simulation.data, camera=camera, scene_option=self._option
-        )
+        self._renderer.update_scene(self._simulation.data, camera=camera, scene_option=self._option)
         for stream in self._simulation.streams:
             _draw_stream(self._renderer.scene, stream)
         return np.asarray(self._renderer.render())
@@ -108,6 +109,19 @@ def check_cameras(cameras: Sequence[str]) -> tuple[str, ...]:
     if not cameras or len(set(cameras)) != len(cameras):
         raise ConfigError(f"Name each camera once, at least one of {', '.join(CAMERAS)}.")
     return tuple(cameras)
+
+
+def check_look(width: int, height: int, quality: str) -> None:
+    """Check what a renderer is asked for without starting OpenGL.
+
+    Raises:
+        ConfigError: unknown quality, or a side out of range.
+    """
+    if quality not in QUALITIES:
+        raise ConfigError(f"Unknown quality '{quality}'; choose {', '.join(QUALITIES)}.")
+    for name, side in (("width", width), ("height", height)):
+        if not 1 <= side <= LARGEST_SIDE:
+            raise ConfigError(f"The {name} is {side} pixels; choose from 1 to {LARGEST_SIDE}.")
 
 
 def _draw_stream(scene: Any, stream: Stream) -> None:

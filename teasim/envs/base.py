@@ -1,7 +1,7 @@
 """What both environments share: the station, how it is reset, seen and judged."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from teasim.constants import FPS, SUBTASKS
 from teasim.envs.observations import observation_space, observe
 from teasim.errors import ConfigError
-from teasim.render import StationRenderer, check_cameras
+from teasim.render import StationRenderer, check_cameras, check_look
 from teasim.task.recipes import allowed_next, next_correct
 from teasim.task.scoring import Verdict, judge
 from teasim.world.simulation import Simulation
@@ -22,7 +22,7 @@ RENDER_SIZE = (480, 640)
 class StationEnv(gymnasium.Env[dict[str, Any], Any]):
     """The tea-making station; subclasses say what an action is."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": FPS}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": FPS}  # noqa: RUF012 (Gymnasium's way)
 
     def __init__(
         self,
@@ -50,6 +50,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ConfigError(f"Unknown render_mode '{render_mode}'; choose None or rgb_array.")
+        check_look(width, height, quality)
         self.render_mode = render_mode
         self._cameras = check_cameras(cameras)
         self._size = (height, width)
@@ -62,9 +63,13 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Start a new episode: everything in place, both arms at READY."""
+        """Start a new episode: everything in place, both arms at READY.
+
+        `options={"randomize": False}` puts everything in its nominal place this once.
+        """
         super().reset(seed=seed)
-        layout = sample_layout(self.np_random) if self._randomize else nominal_layout()
+        randomize = (options or {}).get("randomize", self._randomize)
+        layout = sample_layout(self.np_random) if randomize else nominal_layout()
         self._simulation.reset(layout)
         return self._observation(), self._info(self._verdict())
 

@@ -34,9 +34,7 @@ class TeaMakingEnv(StationEnv):
         self._counted = 0
         return super().reset(seed=seed, options=options)
 
-    def step(
-        self, action: Any
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Advance 0.1 s towards the targets."""
         self._simulation.step(self.target(np.asarray(action, dtype=np.float64)))
         verdict = self._verdict()

@@ -18,6 +18,4 @@ def register_envs() -> None:
             max_episode_steps=10 * MAX_SECONDS,
         )
     if SUBTASK_ENV not in gymnasium.registry:
-        gymnasium.register(
-            SUBTASK_ENV, entry_point="teasim.envs.subtask_env:TeaMakingSubtasksEnv"
-        )
+        gymnasium.register(SUBTASK_ENV, entry_point="teasim.envs.subtask_env:TeaMakingSubtasksEnv")

@@ -53,9 +53,7 @@ class TeaMakingSubtasksEnv(StationEnv):
         self._actions = 0
         return super().reset(seed=seed, options=options)
 
-    def step(
-        self, action: Any
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Carry out sub-task number `action`."""
         refused = self._carry_out(SUBTASKS[int(action)])
         self._actions += 1

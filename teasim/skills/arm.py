@@ -130,7 +130,7 @@ class Arm:
     def line(self, goal: SE3, speed: float | None = None) -> Motion:
         """Straight motion of the hand to `goal` with a peak `speed` [m/s]."""
         start = self.tcp
-        distance = np.linalg.norm(position(goal) - position(start))
+        distance = float(np.linalg.norm(position(goal) - position(start)))
         turn = turn_angle(start, goal)
         peak = max(distance / (speed or self.CARRY_SPEED), turn / self.TURN_SPEED)
         yield from self.path(lambda share: between(start, goal, share), peak * EASE_PEAK)

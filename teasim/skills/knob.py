@@ -1,6 +1,7 @@
 """Turning the oven's knob: grasp its bar from above, turn the wrist by a quarter."""
 
 import numpy as np
+from mink import SE3
 
 from teasim.skills.arm import Arm, Motion
 from teasim.skills.geometry import DOWN, UP, about, pose, position, rotation, tool
@@ -22,7 +23,7 @@ def turn_knob_to(arm: Arm, goal: float) -> Motion:
     yield from arm.take(grasp, OPENING)
     turn = goal - angle
 
-    def turned(share: float) -> object:
+    def turned(share: float) -> SE3:
         return pose(position(grasp), about(UP, turn * share) @ rotation(grasp))
 
     yield from arm.path(turned, max(abs(turn), 0.1) / arm.TURN_SPEED * 1.6)

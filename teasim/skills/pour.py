@@ -15,7 +15,7 @@ from mink import SE3
 from teasim.constants import CONTROL_TIMESTEP
 from teasim.errors import SkillError
 from teasim.skills.arm import Arm, Curve, Motion
-from teasim.skills.geometry import DOWN, UP, about, between, pose, position, rotation, shifted, tool
+from teasim.skills.geometry import DOWN, UP, about, between, pose, rotation, shifted, tool
 from teasim.world.liquids import RIM_HEIGHT
 from teasim.world.simulation import Simulation
 from teasim.world.station import NOMINAL, body_name

@@ -84,9 +84,9 @@ class _Segment:
         slope = self._rate * (1 - 4 * s + 3 * s**2) + self._move * (4 * s - 3 * s**2)
         lead = control._feedforward * slope / CONTROL_TIMESTEP
         data.ctrl[control._arm_actuators] = np.clip(position + lead, *control._limits.T)
-        stride = FINGER_SPEED * CONTROL_TIMESTEP / UPDATES_PER_CONTROL
         # Blocked fingers do not move, so nothing keeps the force from building up at once.
         lag = data.qpos[control._finger_addresses] - control._fingers
-        stride = np.where(lag > BLOCKED_LAG, 10 * stride, stride)
+        speed = np.where(lag > BLOCKED_LAG, 10 * FINGER_SPEED, FINGER_SPEED)
+        stride = speed * CONTROL_TIMESTEP / UPDATES_PER_CONTROL
         control._fingers += np.clip(self.fingers - control._fingers, -stride, stride)
         data.ctrl[control._finger_actuators] = control._fingers

@@ -1,6 +1,7 @@
 import numpy as np
+import pytest
 
-from filtering.explain import Finding, explain, find_strange_steps
+from filtering.explain import Finding, explain, find_strange_steps, usual_order
 from filtering.sequence import transitions
 from filtering.weights.score import Score
 from teasim.pool import Span
@@ -53,14 +54,64 @@ def test_without_a_finding_it_says_so() -> None:
     assert explain([], 10).startswith("No single step stands out")
 
 
-def test_an_omission_is_found_where_the_step_was_most_expected() -> None:
-    names = ("a", "b", "c")
-    spans = (Span("a", 0, 10), Span("c", 10, 20))
-    rows = transitions([np.ones((2, 1))], [[0, 2]], 3)
-    log_p = np.log([[0.9, 0.03, 0.03, 0.04], [0.04, 0.9, 0.03, 0.03], [0.03, 0.03, 0.04, 0.9]])
-    step = log_p.max(axis=1) - log_p[np.arange(3), rows.nexts]
-    score = Score(step, log_p, np.array([[0.0, 2.5, 0.0]]), np.array([6.0]))
-    [[finding]] = find_strange_steps(rows, score, [spans], names)
+NAMES = ("a", "b", "c", "d")
+ABCD = [0, 1, 2, 3]
+
+
+def spans_of(labels: list[int]) -> tuple[Span, ...]:
+    return tuple(Span(NAMES[label], 10 * n, 10 * n + 10) for n, label in enumerate(labels))
+
+
+def findings(
+    labels: list[int], omitted: dict[int, float], expected: dict[int, int]
+) -> list[Finding]:
+    """Findings of the last demonstration, after three of a, b, c, d; `expected` is row -> label."""
+    demos = [ABCD, ABCD, ABCD, labels]
+    rows = transitions([np.ones((len(d), 1)) for d in demos], demos, len(NAMES))
+    p = np.full((len(rows.nexts), 5), 0.02)
+    p[np.arange(len(p)), rows.nexts] = 0.2
+    first = int(np.flatnonzero(rows.demos == 3)[0])
+    for row in range(len(p)):
+        p[row, expected.get(row - first, rows.nexts[row])] = 0.9
+    log_p = np.log(p)
+    step = log_p.max(axis=1) - log_p[np.arange(len(p)), rows.nexts]
+    omission = np.zeros((4, len(NAMES)))
+    for label, surprise in omitted.items():
+        omission[3, label] = surprise
+    score = Score(step, log_p, omission, np.array([0.0, 0.0, 0.0, 5.0]))
+    segments = [spans_of(demo) for demo in demos]
+    found = find_strange_steps(rows, score, segments, NAMES)
+    assert found[:3] == [(), (), ()]
+    return list(found[3])
+
+
+def test_an_omission_is_joined_to_the_strange_step_at_its_place() -> None:
+    [finding] = findings([0, 2, 3], {1: 2.5}, {1: 1})
     assert (finding.expected, finding.seen, finding.missing) == ("b", "c", True)
-    assert finding.frame == 10
-    assert finding.after == spans[0]
+    assert (finding.frame, finding.after) == (10, Span("a", 0, 10))
+    assert finding.surprise == pytest.approx(2.5 + np.log(0.9 / 0.2))
+
+
+def test_two_omissions_in_a_row_are_both_put_where_they_belong() -> None:
+    first, second = findings([0, 3], {1: 2.5, 2: 2.5}, {1: 1})
+    assert (first.expected, first.frame) == ("b", 10)
+    assert (second.expected, second.seen, second.frame) == ("c", "d", 10)
+
+
+def test_an_omitted_last_step_is_put_at_the_end() -> None:
+    [finding] = findings([0, 1, 2], {3: 2.5}, {3: 3})
+    assert (finding.expected, finding.seen, finding.frame) == ("d", None, 30)
+
+
+def test_another_order_is_no_omission() -> None:
+    [finding] = findings([0, 2, 1, 3], {}, {1: 1})
+    assert (finding.expected, finding.seen, finding.missing) == ("b", "c", False)
+
+
+def test_usual_order_is_what_most_demonstrations_do() -> None:
+    demos = [ABCD, ABCD, ABCD, [1, 0, 1]]
+    rows = transitions([np.ones((len(d), 1)) for d in demos], demos, 4)
+    order = usual_order(rows, np.ones(4))
+    assert order[0, 1] == pytest.approx(3.5 / 5)
+    assert order[0, 1] + order[1, 0] == pytest.approx(1.0)
+    assert order[2, 3] == pytest.approx(3.5 / 4)
