@@ -10,7 +10,7 @@ import numpy as np
 
 from teasim.constants import FPS, STATE_NAMES, SUBTASKS
 from teasim.errors import ConfigError, GenerationError, SkillError
-from teasim.parallel import run
+from teasim.parallel import check_workers, run
 from teasim.pool import (
     EpisodeRecord,
     EpisodeWriter,
@@ -22,7 +22,7 @@ from teasim.pool import (
     episode_is_done,
     finalize_pool,
 )
-from teasim.render import StationRenderer, check_cameras
+from teasim.render import StationRenderer, check_cameras, check_look
 from teasim.rollout import Step, demonstrate
 from teasim.task.mistakes import Plan, mistake
 from teasim.task.recipes import INCORRECT, OPTIMAL, SEQ_1, SEQ_2, SUBOPTIMAL
@@ -63,6 +63,7 @@ class GenerateConfig:
             ConfigError: a count is negative, the pool is empty, or a name or size is unknown.
         """
         check_cameras(self.cameras)
+        check_look(self.size, self.size, self.quality)
         sequences = {"--seq1": self.seq1, "--seq2": self.seq2, "--seq3": self.seq3}
         counts = sequences | dict(self.mistakes)
         for name, count in counts.items():
@@ -108,10 +109,12 @@ def generate(
     """Make a pool below `root`, in `jobs` processes; an interrupted one is continued.
 
     Raises:
+        ConfigError: `jobs` or `backend` makes no sense.
         PoolError: `root` is in use.
         GenerationError: a demonstration never came out as labelled.
         RenderError: no headless OpenGL back end works.
     """
+    check_workers(jobs, backend)
     plans = plan_pool(config)
     header = pool_header(config)
     claim_folder(Path(root), header)

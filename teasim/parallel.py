@@ -45,12 +45,9 @@ def run(
     pickled. `progress` None means: a bar when stderr is a terminal.
 
     Raises:
-        ConfigError: `backend` is unknown or not installed, or `jobs` is not positive.
+        ConfigError: see `check_workers`, or the back end's package is not installed.
     """
-    if jobs < 1:
-        raise ConfigError(f"jobs is {jobs}; choose 1 or more.")
-    if backend not in BACKENDS:
-        raise ConfigError(f"Unknown parallel backend '{backend}'; choose {', '.join(BACKENDS)}.")
+    check_workers(jobs, backend)
     show = sys.stderr.isatty() if progress is None else progress
     bar = tqdm(total=len(items), desc=description, disable=not show, file=sys.stderr, leave=False)
     with bar:
@@ -59,6 +56,18 @@ def run(
             results.append(result)
             bar.update()
     return results
+
+
+def check_workers(jobs: int, backend: str) -> None:
+    """Check how `run` is to work before anything is begun.
+
+    Raises:
+        ConfigError: `jobs` is not positive, or `backend` is unknown.
+    """
+    if jobs < 1:
+        raise ConfigError(f"jobs is {jobs}; choose 1 or more.")
+    if backend not in BACKENDS:
+        raise ConfigError(f"Unknown parallel backend '{backend}'; choose {', '.join(BACKENDS)}.")
 
 
 def _results(

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 DOT_WIDTH = 0.022
 """Width of a dot [weight]; dots closer than that are stacked."""
@@ -20,10 +19,14 @@ class Dot:
     """Height in the stack, 0 is the lowest."""
 
 
-class _HasPlace(Protocol):
-    @property
-    def second(self) -> float:
-        """Where it is [s]."""
+@dataclass(frozen=True)
+class Mark:
+    """A strange place on a timeline."""
+
+    second: float
+    """Where it is [s]."""
+    text: str
+    """What is strange there, in two to four words."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class PlacedMark:
     """Distance from the left end [% of the longest video]."""
     level: int
     """Line of its text, 0 is the closest to the timeline."""
-    mark: _HasPlace
+    mark: Mark
     """The mark."""
     turned: bool
     """Whether the text stands left of the place, because there is no room on its right."""
@@ -50,11 +53,11 @@ def place_dots(weights: Sequence[float]) -> list[Dot]:
     return placed
 
 
-def place_marks(marks: Sequence[_HasPlace], longest: float) -> list[PlacedMark]:
+def place_marks(marks: Sequence[Mark], longest: float) -> list[PlacedMark]:
     """Put the texts of marks on lines so that they do not overlap."""
     placed: list[PlacedMark] = []
     # From right to left: an earlier mark stands higher, so no line runs through a text.
-    for mark in sorted(marks, key=lambda item: -item.second):
+    for mark in sorted(reversed(marks), key=lambda item: -item.second):
         left = 100.0 * mark.second / longest
         turned = left > 100.0 - MARK_WIDTH
         taken = {other.level for other in placed if abs(other.left - left) < 2 * MARK_WIDTH}

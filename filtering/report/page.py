@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from filtering.report.layout import Dot, place_dots, place_marks
+from filtering.report.layout import Dot, Mark, place_dots, place_marks
 from teasim.errors import TeasimError
 from teasim.pool.files import write_text
 
@@ -37,16 +37,6 @@ class Segment:
     """Where it starts [s]."""
     stop: float
     """Where it stops [s]."""
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A strange place on a timeline."""
-
-    second: float
-    """Where it is [s]."""
-    text: str
-    """What is strange there, in two to four words."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ import numpy as np
 
 from filtering.demo_filter import DemoFilter
 from filtering.explain import Finding, gravest
-from filtering.report.page import DemoView, Mark, Segment
+from filtering.report.layout import Mark
+from filtering.report.page import DemoView, Segment
 from teasim.pool import Episode, Pool, VideoClip, read_frames
 from teasim.pool.videos import VideoWriter, video_content
 

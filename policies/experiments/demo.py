@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.demo_filter import DemoFilter, FilterConfig, write_filter_output
-from filtering.report import ReportSection
+from filtering.demo_filter import DemoFilter, FilterConfig
+from filtering.output import write_filter_output
+from filtering.report import ReportSection, render_report
+from filtering.report.views import demo_views
 from policies.bc import BC, BCConfig
 from policies.checkpoint import save_policy
 from policies.demos import load_decisions
@@ -101,7 +103,7 @@ def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
     watch = Stopwatch()
     pool = generate_pool(out / "pool", config, jobs)
     watch.lap("generate")
-    settings = FilterConfig(frames_per_segment=config.frames_per_segment, seed=config.seed)
+    settings = FilterConfig(frames_per_segment=config.frames_per_segment)
     found = DemoFilter(settings).fit(pool, jobs=jobs)
     watch.lap("filter")
     scores = compare_policies(pool, found.flagged_, out, config, jobs)
@@ -113,7 +115,14 @@ def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
         watch.seconds,
     )
     section = ReportSection("Policies", score_section(scores))
-    write_filter_output(out, pool, found, sections=[section])
+    write_filter_output(out / "filter", pool, found)
+    render_report(
+        out / "report.html",
+        demos=demo_views(pool, found),
+        threshold=found.threshold_,
+        subtasks=found.segments_.subtasks,
+        sections=[section],
+    )
     write_json(out / "demo.json", as_record(findings, config))
     return summary(findings, out)
 

@@ -80,7 +80,7 @@ def parse_mistakes(words: Sequence[str]) -> tuple[tuple[str, int], ...]:
         name, _, count = word.partition(":")
         if name in counts:
             raise ConfigError(f"The mistake '{name}' is given twice; write it once as NAME:COUNT.")
-        if count and not count.isdigit():
+        if count and not count.isdecimal():
             raise ConfigError(f"'{word}' is no mistake with a count; write NAME or NAME:COUNT.")
         counts[name] = int(count or 1)
     return tuple(counts.items())

@@ -66,10 +66,14 @@ def simulate(
     return SimulatedPool(features, labels, np.array(correct))
 
 
-def pool_of(n_correct: int, kind: str, n_wrong: int, *, seed: int, **looks: float) -> SimulatedPool:
+def pool_of(
+    n_correct: int, kind: str, n_wrong: int, *, seed: int, noise: float = 0.5
+) -> SimulatedPool:
     rng = np.random.default_rng([seed, 1])
     wrong = [SEQ_2 if kind == "seq_2" else seq_3(rng) for _ in range(n_wrong)]
     sequences = [SEQ_1] * n_correct + wrong
     correct = [True] * n_correct + [False] * n_wrong
     order = rng.permutation(len(sequences))
-    return simulate([sequences[i] for i in order], [correct[i] for i in order], seed=seed, **looks)
+    return simulate(
+        [sequences[i] for i in order], [correct[i] for i in order], seed=seed, noise=noise
+    )

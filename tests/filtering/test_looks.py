@@ -87,7 +87,7 @@ def test_backbone_has_the_published_maps_and_is_deterministic() -> None:
 
 def test_pretrained_weights_recognise_a_daisy() -> None:
     """Class 985 of ImageNet; wrong padding, scaling or folding loses it."""
-    from sklearn.datasets import load_sample_image
+    from sklearn.datasets import load_sample_image  # type: ignore[import-untyped]
 
     from filtering.backbone import weights_path
 

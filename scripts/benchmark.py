@@ -1,0 +1,225 @@
+"""Measure what pictures, demonstrations and environment steps cost, in processor time.
+
+Generation and environment steps are compared with a floor measured in the same run, by turns: the
+same physics steps, the same pictures and the same encoded frames in bare loops.
+"""
+
+import argparse
+import json
+import os
+import resource
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from teasim.parallel import WORKER_ENVIRONMENT
+
+os.environ.update(WORKER_ENVIRONMENT)  # one thread, before OpenGL and NumPy start
+
+import gymnasium  # noqa: E402
+import mujoco  # noqa: E402
+import numpy as np  # noqa: E402
+
+from teasim.constants import (  # noqa: E402
+    FPS,
+    QUALITIES,
+    STEPS_PER_UPDATE,
+    UPDATES_PER_CONTROL,
+)
+from teasim.generate import GenerateConfig, generate_demo, plan_pool  # noqa: E402
+from teasim.pool.videos import VideoWriter  # noqa: E402
+from teasim.render import StationRenderer  # noqa: E402
+from teasim.rollout import demonstrate  # noqa: E402
+from teasim.world.simulation import Simulation  # noqa: E402
+from teasim.world.station import nominal_layout  # noqa: E402
+
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+ENVIRONMENT_STEPS = 200
+
+
+@dataclass
+class Recording:
+    """The motor commands of a simulation, to be played again without anything around it."""
+
+    simulation: Simulation
+    """Whose model and data to play it with."""
+    start: np.ndarray
+    """State of the physics before the first command."""
+    controls: list[np.ndarray]
+    """One vector of motor commands per update."""
+
+    @classmethod
+    def of(cls, simulation: Simulation) -> "Recording":
+        """Record from now on."""
+        start = np.zeros(mujoco.mj_stateSize(simulation.model, STATE))
+        mujoco.mj_getState(simulation.model, simulation.data, start, STATE)
+        recording = cls(simulation, start, [])
+        simulation.observers.append(lambda: recording.controls.append(simulation.data.ctrl.copy()))
+        return recording
+
+    def play(self, before_step: Callable[[], None] = lambda: None) -> None:
+        """Bare loop over the same physics steps; `before_step` is called once per frame."""
+        model, data = self.simulation.model, self.simulation.data
+        mujoco.mj_setState(model, data, self.start, STATE)
+        mujoco.mj_forward(model, data)
+        for update, control in enumerate(self.controls):
+            if update % UPDATES_PER_CONTROL == 0:
+                before_step()
+            data.ctrl[:] = control
+            mujoco.mj_step(model, data, nstep=STEPS_PER_UPDATE)
+
+
+def cost(work: Callable[[], object]) -> float:
+    """Processor seconds of this process and of the encoders it waits for."""
+
+    def now() -> float:
+        children = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return time.process_time() + children.ru_utime + children.ru_stime
+
+    start = now()
+    work()
+    return now() - start
+
+
+def medians(works: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+    """Median cost of each [s], measured by turns so that a busy machine meets all alike."""
+    costs: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(repeats):
+        for name, work in works.items():
+            costs[name].append(cost(work))
+    return {name: float(np.median(values)) for name, values in costs.items()}
+
+
+def pictures(size: int, repeats: int) -> dict[str, float]:
+    """Milliseconds per picture, by quality and camera."""
+    works: dict[str, Callable[[], object]] = {}
+    renderers = []
+    for quality in QUALITIES:
+        simulation = Simulation()
+        simulation.reset(nominal_layout())
+        renderer = StationRenderer(simulation, width=size, height=size, quality=quality)
+        renderers.append(renderer)
+        for camera in ("left", "cup"):
+            frames, name = renderer.frames, (camera,)
+            frames(name)  # the first one uploads the shapes
+            works[f"{quality} {camera}"] = lambda frames=frames, name=name: frames(name)
+    found = medians(works, 8 * repeats)
+    for renderer in renderers:
+        renderer.close()
+    return {name: 1000 * seconds for name, seconds in found.items()}
+
+
+def generation(size: int, repeats: int) -> dict[str, float]:
+    """Cost of a Seq_1 demonstration and of its floor [s], and their ratio."""
+    config = GenerateConfig(seq1=1, size=size)
+    (demo,) = plan_pool(config)
+    simulation = Simulation()
+    recorded = demonstrate(
+        simulation, demo.plan.steps, np.random.default_rng([config.seed, 1, demo.index, 0])
+    )
+    next(recorded)  # the station has come to rest
+    recording = Recording.of(simulation)
+    for _ in recorded:
+        pass
+    with tempfile.TemporaryDirectory() as folder:
+        works = {
+            "demonstration": lambda: generate_demo(fresh(folder), config, demo),
+            "floor": lambda: bare_demonstration(fresh(folder), config, recording),
+            "physics": recording.play,
+        }
+        found = medians(works, repeats)
+    frames = len(recording.controls) // UPDATES_PER_CONTROL
+    ratio = found["demonstration"] / found["floor"]
+    return found | {"frames": frames, "ratio": ratio}
+
+
+def fresh(folder: str) -> Path:
+    """Make a new folder below `folder`."""
+    return Path(tempfile.mkdtemp(dir=folder))
+
+
+def bare_demonstration(folder: Path, config: GenerateConfig, recording: Recording) -> None:
+    """The same steps, pictures and encoded frames, and nothing else."""
+    simulation, size = recording.simulation, config.size
+    model, data = simulation.model, simulation.data
+    option = mujoco.MjvOption()
+    option.geomgroup[:] = [1, 1, 1, 0, 0, 0]
+    model.vis.global_.offwidth = model.vis.global_.offheight = size
+    model.vis.quality.shadowsize = model.vis.quality.offsamples = 0
+    videos = {
+        camera: VideoWriter(folder / f"{camera}.mp4", height=size, width=size, fps=FPS)
+        for camera in config.cameras
+    }
+    with mujoco.Renderer(model, size, size) as renderer:
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+
+        def film() -> None:
+            for camera, video in videos.items():
+                renderer.update_scene(data, camera=camera, scene_option=option)
+                video.add(renderer.render())
+
+        recording.play(film)
+    for video in videos.values():
+        video.close()
+
+
+def environment(repeats: int) -> dict[str, float]:
+    """Steps per second of the joint environment and of its physics alone, and their ratio."""
+    env = gymnasium.make("teasim:teasim/TeaMaking-v0", max_episode_steps=10**9)
+    first, _ = env.reset(seed=0)
+    hold = env.unwrapped.action(first["agent_pos"].astype(float))  # type: ignore[attr-defined]
+    wave = 0.05 * np.sin(np.arange(ENVIRONMENT_STEPS) / 5)[:, None] * np.r_[np.ones(14), 0, 0]
+    actions = (hold + wave).astype(np.float32)
+    recording = Recording.of(env.unwrapped._simulation)  # type: ignore[attr-defined]
+    for action in actions:
+        env.step(action)
+    recording.simulation.observers.clear()
+
+    def steps() -> None:
+        for action in actions:
+            env.step(action)
+
+    def again() -> None:
+        env.reset(seed=0)
+        steps()
+
+    works = {"steps": again, "reset": lambda: env.reset(seed=0), "floor": recording.play}
+    found = medians(works, repeats)
+    env.close()
+    spent = found["steps"] - found["reset"]
+    return {
+        "steps per second": ENVIRONMENT_STEPS / spent,
+        "floor per second": ENVIRONMENT_STEPS / found["floor"],
+        "ratio": spent / found["floor"],
+    }
+
+
+def show(results: dict[str, dict[str, float]]) -> None:
+    """Print the results as a table."""
+    for title, values in results.items():
+        print(title)
+        for name, value in values.items():
+            print(f"    {name:20} {value:10.2f}")
+
+
+def main() -> None:
+    """Measure and report."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--size", type=int, default=224, help="side of the pictures [pixels]")
+    parser.add_argument("--repeats", type=int, default=5, help="how often everything is measured")
+    parser.add_argument("--json", type=Path, help="file to write the numbers to")
+    given = parser.parse_args()
+    results = {
+        "pictures [ms]": pictures(given.size, given.repeats),
+        "generation [s]": generation(given.size, given.repeats),
+        "joint environment": environment(given.repeats),
+    }
+    show(results)
+    if given.json:
+        given.json.write_text(json.dumps(results, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
