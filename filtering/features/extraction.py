@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from filtering.background import subtraction_named
 from filtering.cache import ArrayCache, default_folder
 from filtering.frames import fit_size, segment_indices, uniform_indices
+from filtering.pretrained import weights_digest
 from teasim import parallel
 from teasim.pool import Pool, Span, VideoClip, read_frames
 from teasim.pool.videos import video_content
@@ -66,31 +67,37 @@ def segment_features(
         for episode, spans in zip(pool.episodes, segments, strict=True)
         for camera in cameras
     ]
-    described = parallel.run(describe_video, tasks, jobs=jobs, description="looking at videos")
+    described = _over_time(tasks, jobs)
     return [
         np.hstack(described[first : first + len(cameras)])
         for first in range(0, len(described), len(cameras))
     ]
 
 
+def _over_time(tasks: Sequence[VideoTask], jobs: int) -> list[NDArray[np.float32]]:
+    """Return (q, 2 * FRAME_FEATURES) per video; workers start only for those not in the cache."""
+    frames = [ArrayCache(task.cache_folder).get(_key(task)) for task in tasks]
+    unknown = [number for number, known in enumerate(frames) if known is None]
+    computed = parallel.run(
+        describe_video,
+        [tasks[number] for number in unknown],
+        jobs=jobs,
+        description="looking at videos",
+    )
+    for number, features in zip(unknown, computed, strict=True):
+        frames[number] = features
+    return [
+        pool_over_time(task, features)
+        for task, features in zip(tasks, frames, strict=True)
+        if features is not None
+    ]
+
+
 def describe_video(task: VideoTask) -> NDArray[np.float32]:
-    """Return (q, 2 * FRAME_FEATURES): mean and maximum over time of each segment's frames."""
-    per_segment = segment_indices(task.spans, task.frames_per_segment)
-    indices = np.unique(np.concatenate(per_segment))
-    features = _frame_features(task, indices)
-    rows = [features[np.searchsorted(indices, part)] for part in per_segment]
-    return np.stack([np.concatenate([part.mean(axis=0), part.max(axis=0)]) for part in rows])
-
-
-def _frame_features(task: VideoTask, indices: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return the features of the frames `indices`, from the cache if they are there."""
-    cache = ArrayCache(task.cache_folder)
-    key = _key(task, indices)
-    known = cache.get(key)
-    if known is not None and len(known) == len(indices):
-        return known
+    """Return the features (n, FRAME_FEATURES) of the n frames of `task`, and cache them."""
     from filtering.backbone import describe_frames
 
+    indices = _frames_of(task)
     overview = uniform_indices(0, task.clip.length, OVERVIEW)
     wanted = np.unique(np.concatenate([indices, overview]))
     frames = fit_size(read_frames(task.clip, wanted))
@@ -98,18 +105,32 @@ def _frame_features(task: VideoTask, indices: NDArray[np.int64]) -> NDArray[np.f
         frames[np.searchsorted(wanted, indices)], frames[np.searchsorted(wanted, overview)]
     )
     features = describe_frames(foreground)
-    cache.put(key, features)
+    ArrayCache(task.cache_folder).put(_key(task), features)
     return features
 
 
-def _key(task: VideoTask, indices: NDArray[np.int64]) -> str:
-    """Hash the encoded frames of the clip, which of them are used, and all that is done to them."""
-    from filtering.backbone import weights_digest
+def pool_over_time(task: VideoTask, frames: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return (q, 2 * FRAME_FEATURES): mean and maximum over the frames of each segment."""
+    indices = _frames_of(task)
+    parts = [
+        frames[np.searchsorted(indices, chosen)]
+        for chosen in segment_indices(task.spans, task.frames_per_segment)
+    ]
+    return np.stack([np.concatenate([part.mean(axis=0), part.max(axis=0)]) for part in parts])
 
+
+def _frames_of(task: VideoTask) -> NDArray[np.int64]:
+    """Return the frames that are looked at, each once and in order."""
+    return np.unique(np.concatenate(segment_indices(task.spans, task.frames_per_segment)))
+
+
+def _key(task: VideoTask) -> str:
+    """Hash the encoded frames of the clip, which of them are used, and all that is done to them."""
     clip = task.clip
     content = hashlib.sha256()
     for digest in video_content(clip.path).digests[clip.start_frame :][: clip.length]:
         content.update(digest)
-    recipe = [RECIPE, weights_digest(), task.background, OVERVIEW, clip.length, indices.tolist()]
+    used = _frames_of(task).tolist()
+    recipe = [RECIPE, weights_digest(), task.background, OVERVIEW, clip.length, used]
     content.update(json.dumps(recipe).encode())
     return content.hexdigest()

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.demo_filter import DemoFilter, FilterConfig
+from filtering.demo_filter import FEWEST_DEMOS, DemoFilter, FilterConfig
 from filtering.output import write_filter_output
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
+from policies.base import DecisionSamples
 from policies.bc import BC, BCConfig
 from policies.checkpoint import save_policy
 from policies.demos import load_decisions
@@ -29,9 +31,13 @@ from policies.outputs import check_folder
 from policies.results import as_json
 from policies.results import summary as rates
 from policies.rollout import EnvironmentConfig
+from policies.subtask_policy import SubtaskPolicy
+from policies.weighting import demo_weights
+from teasim import parallel
 from teasim.errors import ConfigError, GenerationError
 from teasim.pool import Pool
 from teasim.pool.files import write_json
+from teasim.pool.weight_table import read_weight_table
 
 ALL = "all demonstrations"
 KEPT = "without the flagged"
@@ -55,12 +61,13 @@ class DemoConfig:
     """The world the policies are tried out in."""
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a pool without demonstrations to learn from."""
-        if self.seq1 < 1 or self.seq3 < 0:
+        """Raise ConfigError for a pool that cannot be filtered, or no episode."""
+        if min(self.seq1, self.seq3) < 0 or self.seq1 + self.seq3 < FEWEST_DEMOS:
             raise ConfigError(
-                f"The demo needs one correct demonstration or more and no negative number, "
+                f"The demo needs {FEWEST_DEMOS} demonstrations or more, "
                 f"not --seq1 {self.seq1} --seq3 {self.seq3}."
             )
+        EvaluationConfig(self.episodes)
 
 
 @dataclass(frozen=True)
@@ -103,26 +110,22 @@ def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
     watch = Stopwatch()
     pool = generate_pool(out / "pool", config, jobs)
     watch.lap("generate")
-    settings = FilterConfig(frames_per_segment=config.frames_per_segment)
-    found = DemoFilter(settings).fit(pool, jobs=jobs)
+    fitted = DemoFilter(FilterConfig(frames_per_segment=config.frames_per_segment))
+    fitted.fit(pool, jobs=jobs)
+    write_filter_output(out / "filter", pool, fitted)
     watch.lap("filter")
-    scores = compare_policies(pool, found.flagged_, out, config, jobs)
-    watch.lap("policies")
+    policies = train_policies(pool, out / "filter" / "weights.csv", out / "policies", config, jobs)
+    watch.lap("train")
+    trial = EvaluationConfig(episodes=config.episodes, environment=config.environment)
+    scores = {name: evaluate(policy, trial, jobs=jobs) for name, policy in policies.items()}
+    watch.lap("evaluate")
     findings = Findings(
-        tuple(e.index for e, flag in zip(pool.episodes, found.flagged_, strict=True) if flag),
+        tuple(row.episode_index for row in fitted.table() if row.flagged),
         tuple(e.index for e in pool.episodes if e.record is not None and not e.record.correct),
         scores,
         watch.seconds,
     )
-    section = ReportSection("Policies", score_section(scores))
-    write_filter_output(out / "filter", pool, found)
-    render_report(
-        out / "report.html",
-        demos=demo_views(pool, found),
-        threshold=found.threshold_,
-        subtasks=found.segments_.subtasks,
-        sections=[section],
-    )
+    write_report(out / "report.html", pool, fitted, findings)
     write_json(out / "demo.json", as_record(findings, config))
     return summary(findings, out)
 
@@ -143,23 +146,40 @@ def generate_pool(path: Path, config: DemoConfig, jobs: int) -> Pool:
     return Pool.open(path)
 
 
-def compare_policies(
-    pool: Pool, flagged: NDArray[np.bool_], out: Path, config: DemoConfig, jobs: int
-) -> dict[str, dict[str, Scores]]:
-    """Clone behaviour from all of `pool` and from what is not flagged, (D,), and try both out."""
-    sets = {ALL: np.ones(len(flagged))}
-    if flagged.any() and not flagged.all():
-        sets[KEPT] = (~flagged).astype(float)
+def train_policies(
+    pool: Pool, table: Path, out: Path, config: DemoConfig, jobs: int
+) -> dict[str, SubtaskPolicy]:
+    """Clone behaviour from all of `pool`, and again without what the weight `table` flags.
+
+    The second is left out where the filter flags nothing, or everything.
+    """
+    sets = {ALL: demo_weights(pool, table, "ignore")}
+    if len({row.flagged for row in read_weight_table(table)}) == 2:
+        sets[KEPT] = demo_weights(pool, table, "discard")
     samples = load_decisions(pool, jobs=jobs)
-    trial = EvaluationConfig(episodes=config.episodes, environment=config.environment)
-    scores = {}
-    for name, weights in sets.items():
-        settings = BCConfig(seed=config.seed)
-        policy = BC(settings).fit(samples, weights).policy_
-        training = {"learner": "bc", "settings": asdict(settings), "demo_weights": list(weights)}
-        save_policy(policy, out / "policies" / name.replace(" ", "_"), training=training)
-        scores[name] = evaluate(policy, trial, jobs=jobs)
-    return scores
+    settings = BCConfig(seed=config.seed)
+    fit = partial(_fit, samples, settings)
+    learned = parallel.run(fit, list(sets.values()), jobs=jobs, description="policies")
+    policies = dict(zip(sets, learned, strict=True))
+    for name, policy in policies.items():
+        training = {"learner": "bc", "settings": asdict(settings), "weights": sets[name].tolist()}
+        save_policy(policy, out / name.replace(" ", "_"), training=training)
+    return policies
+
+
+def _fit(samples: DecisionSamples, config: BCConfig, weights: NDArray[np.float64]) -> SubtaskPolicy:
+    return BC(config).fit(samples, weights).policy_
+
+
+def write_report(path: Path, pool: Pool, fitted: DemoFilter, findings: Findings) -> None:
+    """Write the filter's page with the policies' scores at its end."""
+    render_report(
+        path,
+        demos=demo_views(pool, fitted),
+        threshold=fitted.threshold_,
+        subtasks=fitted.segments_.subtasks,
+        sections=[ReportSection("What that does to a policy", score_section(findings.scores))],
+    )
 
 
 def as_record(findings: Findings, config: DemoConfig) -> dict[str, Any]:

@@ -89,7 +89,7 @@ def test_pretrained_weights_recognise_a_daisy() -> None:
     """Class 985 of ImageNet; wrong padding, scaling or folding loses it."""
     from sklearn.datasets import load_sample_image  # type: ignore[import-untyped]
 
-    from filtering.backbone import weights_path
+    from filtering.pretrained import weights_path
 
     picture = fit_size(load_sample_image("flower.jpg")[None, :, 107:534])
     stored = torch.load(weights_path(), weights_only=True)

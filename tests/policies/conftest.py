@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from policies.base import DecisionSamples, ObservationSpec
+from policies.demos import DemosConfig, load_decisions
 from tests.policies.fakes import SEQ_1, make_fake_pool
 
 WITHOUT_TEA_BAG = tuple(action for action in SEQ_1 if action != 4)
@@ -14,6 +15,12 @@ def fake_pool(tmp_path_factory):
     """Six correct demonstrations and one that leaves out the tea bag."""
     path = tmp_path_factory.mktemp("pools") / "fake"
     return make_fake_pool(path, [SEQ_1] * 6 + [WITHOUT_TEA_BAG])
+
+
+@pytest.fixture(scope="session")
+def decisions(fake_pool):
+    """What is learned from `fake_pool`, with one altered view."""
+    return load_decisions(fake_pool, DemosConfig(copies=1))
 
 
 @pytest.fixture(scope="session")

@@ -10,40 +10,37 @@ from teasim.constants import STATE_NAMES, SUBTASKS
 from teasim.errors import ConfigError, PoolError
 from teasim.pool import read_frames
 
-ONE_VIEW = DemosConfig(copies=0)
+
+def test_decisions_of_a_pool(decisions):
+    assert decisions.action_names == SUBTASKS
+    assert decisions.spec == ObservationSpec(("left", "cup"), 64, 64, STATE_NAMES)
+    # Six demonstrations of seven decisions and one of six, each in two views of two cameras.
+    assert decisions.maps.shape == (6 * 7 + 6, 2, 2, 112, 4, 4)
+    np.testing.assert_array_equal(np.bincount(decisions.demos), [7] * 6 + [6])
+    np.testing.assert_array_equal(decisions.labels[:7], [0, 4, 2, 3, 6, 1, 5])
+    assert np.abs(decisions.joints).max() < 1e-3  # at rest, as at the start of every span
+    assert not decisions.maps.flags.writeable
 
 
-def test_decisions_of_a_pool(fake_pool):
-    samples = load_decisions(fake_pool)
-    assert samples.action_names == SUBTASKS
-    assert samples.spec == ObservationSpec(("left", "cup"), 64, 64, STATE_NAMES)
-    # Six demonstrations of seven decisions and one of six, each in four views of two cameras.
-    assert samples.maps.shape == (6 * 7 + 6, 4, 2, 112, 4, 4)
-    np.testing.assert_array_equal(np.bincount(samples.demos), [7] * 6 + [6])
-    np.testing.assert_array_equal(samples.labels[:7], [0, 4, 2, 3, 6, 1, 5])
-    assert np.abs(samples.joints).max() < 1e-3  # at rest, as at the start of every span
-    assert not samples.maps.flags.writeable
-
-
-def test_the_first_view_is_the_frame_at_the_start_of_the_span(fake_pool):
-    samples = load_decisions(fake_pool, ONE_VIEW)
+def test_the_first_view_is_the_frame_at_the_start_of_the_span(fake_pool, decisions):
     episode = fake_pool.episodes[0]
     starts = [span.start for span in episode.spans()]
     frames = {camera: read_frames(episode.video(camera), starts) for camera in ("left", "cup")}
-    np.testing.assert_array_equal(samples.maps[:7, 0], camera_maps(frames, ("left", "cup")))
-    np.testing.assert_array_equal(load_decisions(fake_pool).maps[:, :1], samples.maps)
+    maps = camera_maps(frames, ("left", "cup")).astype(float)
+    # The batches differ, and with them the last bit of a half.
+    np.testing.assert_allclose(decisions.maps[:7, 0], maps, rtol=2e-3, atol=2e-3)
 
 
-def test_altered_views_depend_on_seed_and_demonstration_alone(fake_pool):
-    first, again = load_decisions(fake_pool), load_decisions(fake_pool, DemosConfig(seed=1))
-    np.testing.assert_array_equal(first.maps[:, 0], again.maps[:, 0])
-    assert (first.maps[:, 1] != again.maps[:, 1]).any()
+def test_altered_views_depend_on_seed_and_demonstration_alone(fake_pool, decisions):
+    again = load_decisions(fake_pool, DemosConfig(copies=1, seed=1), jobs=2)
+    np.testing.assert_array_equal(decisions.maps[:, 0], again.maps[:, 0])
+    assert (decisions.maps[:, 1] != again.maps[:, 1]).any(axis=(1, 2, 3, 4)).all()
 
 
-def test_the_number_of_workers_changes_nothing(fake_pool):
-    one, two = load_decisions(fake_pool), load_decisions(fake_pool, jobs=2)
-    np.testing.assert_array_equal(one.maps, two.maps)
-    np.testing.assert_array_equal(one.labels, two.labels)
+def test_the_number_of_workers_changes_nothing(fake_pool, decisions):
+    again = load_decisions(fake_pool, DemosConfig(copies=1), jobs=2)
+    np.testing.assert_array_equal(decisions.maps, again.maps)
+    np.testing.assert_array_equal(decisions.labels, again.labels)
 
 
 def test_a_pool_without_joints_is_learned_from_its_frames(human_pool):
@@ -57,12 +54,11 @@ def test_a_pool_without_joints_is_learned_from_its_frames(human_pool):
     )
 
 
-def test_frames_alone_and_one_camera_can_be_asked_for(fake_pool):
-    both = load_decisions(fake_pool, ONE_VIEW)
-    one = load_decisions(fake_pool, DemosConfig(observe="pixels", cameras=("cup",), copies=0))
+def test_frames_alone_and_one_camera_can_be_asked_for(human_pool):
+    one = load_decisions(human_pool, DemosConfig(observe="pixels", cameras=("cup",), copies=0))
     assert one.spec == ObservationSpec(("cup",), 64, 64)
-    assert one.joints.shape == (48, 0)
-    np.testing.assert_array_equal(one.maps, both.maps[:, :, 1:])
+    assert one.maps.shape[1:3] == (1, 1)
+    assert one.joints.shape == (7, 0)
 
 
 def test_an_unknown_camera_names_the_choices(fake_pool):

@@ -62,19 +62,19 @@ def test_one_observation_and_a_batch_agree(batch):
 
 def test_drawn_actions_follow_the_probabilities(policy, batch):
     many = {
-        "pixels": {camera: frames.repeat(150, 0) for camera, frames in batch["pixels"].items()},
-        "agent_pos": batch["agent_pos"].repeat(150, 0),
+        "pixels": {camera: frames.repeat(100, 0) for camera, frames in batch["pixels"].items()},
+        "agent_pos": batch["agent_pos"].repeat(100, 0),
     }
     draws, _ = policy.predict(many)
-    shares = np.bincount(draws, minlength=7) / 300
-    np.testing.assert_allclose(shares, CHANCES, atol=0.07)
+    shares = np.bincount(draws, minlength=7) / 200
+    np.testing.assert_allclose(shares, CHANCES, atol=0.08)
     assert shares[5:].sum() == 0
 
 
 def test_a_seed_repeats_the_draws(policy, batch):
     def draw(seed):
         policy.set_random_seed(seed)
-        return [policy.predict(batch)[0].tolist() for _ in range(20)]
+        return [policy.predict(batch)[0].tolist() for _ in range(8)]
 
     assert draw(3) == draw(3)
     assert draw(3) != draw(4)
