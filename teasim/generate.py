@@ -25,7 +25,7 @@ from teasim.pool import (
 from teasim.render import StationRenderer, check_cameras, check_look
 from teasim.rollout import Step, demonstrate
 from teasim.task.mistakes import Plan, mistake
-from teasim.task.recipes import INCORRECT, OPTIMAL, SEQ_1, SEQ_2, SUBOPTIMAL
+from teasim.task.recipes import INCORRECT, OPTIMAL, SEQ_1, SEQ_2, SUBOPTIMAL, recognisable
 from teasim.task.scoring import Verdict, judge
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 
@@ -46,7 +46,7 @@ class GenerateConfig:
     seq3: int = 0
     """Incorrect demonstrations, Seq_3: one or two of tea bag, water and oven-off left out."""
     mistakes: tuple[tuple[str, int], ...] = ()
-    """Further incorrect demonstrations: Seq_1 with this mistake (name, how many)."""
+    """Further incorrect demonstrations: Seq_1 with a mistake (NAME or NAME@SUBTASK, how many)."""
     cameras: tuple[str, ...] = ("left", "cup")
     """Cameras that film."""
     size: int = 224
@@ -69,8 +69,8 @@ class GenerateConfig:
         for name, count in counts.items():
             if count < 0:
                 raise ConfigError(f"{name} is {count}; give 0 or more demonstrations.")
-        for name, _ in self.mistakes:
-            mistake(name)
+        for spec, _ in self.mistakes:
+            _with_mistakes([spec], np.random.default_rng(0))
         if not sum(counts.values()):
             raise ConfigError("The pool would be empty; ask for demonstrations with --seq1 N.")
         if not SIZES[0] <= self.size <= SIZES[1] or self.size % 2:
@@ -152,10 +152,11 @@ def plan_pool(config: GenerateConfig) -> tuple[DemoPlan, ...]:
     return tuple(DemoPlan(index, *plans[which]) for index, which in enumerate(order))
 
 
-def _with_mistakes(names: Sequence[str], rng: np.random.Generator) -> Plan:
+def _with_mistakes(specs: Sequence[str], rng: np.random.Generator) -> Plan:
     plan = Plan(SEQ_1)
-    for name in names:
-        plan = mistake(name)(plan, rng)
+    for spec in specs:
+        name, at, subtask = spec.partition("@")
+        plan = mistake(name)(plan, rng, subtask if at else None)
     return plan
 
 
@@ -224,10 +225,9 @@ def _add_frame(
 
 def mismatch(demo: DemoPlan, simulation: Simulation) -> str:
     """Say how what happened physically differs from what the demonstration is labelled as."""
-    done = simulation.subtasks_done
-    if done != demo.plan.steps:
-        happened = Counter(done)
-        planned = Counter(demo.plan.steps)
+    done, expected = simulation.subtasks_done, recognisable(demo.plan.steps)
+    if done != expected:
+        happened, planned = Counter(done), Counter(expected)
         missing = ", ".join((planned - happened).elements()) or "none"
         extra = ", ".join((happened - planned).elements()) or "none"
         return f"Physics saw another order than planned (missing: {missing}; extra: {extra})."

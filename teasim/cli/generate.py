@@ -27,7 +27,7 @@ class GenerateArguments:
     seq3: int = 0
     """Incorrect demonstrations: one or two of tea bag, water and oven-off left out."""
     mistakes: tuple[str, ...] = ()
-    """Further incorrect demonstrations, as NAME or NAME:COUNT."""
+    """Further incorrect demonstrations, as NAME[@SUBTASK][:COUNT], e.g. skip@add_milk:2."""
     cameras: tuple[str, ...] = ("left", "cup")
     """Cameras that film: left, cup, front, top."""
     size: int = 224
@@ -70,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def parse_mistakes(words: Sequence[str]) -> tuple[tuple[str, int], ...]:
-    """Turn NAME and NAME:COUNT into counts.
+    """Turn NAME[@SUBTASK][:COUNT] into counts.
 
     Raises:
         ConfigError: a count is not a number, or a name is given twice.
@@ -81,6 +81,6 @@ def parse_mistakes(words: Sequence[str]) -> tuple[tuple[str, int], ...]:
         if name in counts:
             raise ConfigError(f"The mistake '{name}' is given twice; write it once as NAME:COUNT.")
         if count and not count.isdecimal():
-            raise ConfigError(f"'{word}' is no mistake with a count; write NAME or NAME:COUNT.")
+            raise ConfigError(f"'{word}' is no mistake with a count; write NAME[@SUBTASK][:COUNT].")
         counts[name] = int(count or 1)
     return tuple(counts.items())

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from teasim.errors import ConfigError
-from teasim.task.recipes import CRITICAL
+from teasim.task.recipes import CRITICAL, check_subtask
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,19 @@ class PlannedMistake:
     """Index into the plan's steps at which it happens; what is skipped was due before it."""
 
 
-Mistake = Callable[[Plan, np.random.Generator], Plan]
+Mistake = Callable[[Plan, np.random.Generator, str | None], Plan]
 
 
-def skip(plan: Plan, rng: np.random.Generator) -> Plan:
-    """Leave out one of the critical three that is still in the plan."""
+def skip(plan: Plan, rng: np.random.Generator, subtask: str | None = None) -> Plan:
+    """Leave out `subtask`, or else one of the critical three that is still in the plan.
+
+    Raises:
+        ConfigError: there is no such sub-task, or nothing is left to skip.
+    """
+    if subtask is not None:
+        if check_subtask(subtask) not in plan.steps:
+            raise ConfigError(f"'{subtask}' cannot be skipped in a plan that does not hold it.")
+        return without(plan, subtask)
     choices = [name for name in CRITICAL if name in plan.steps]
     if not choices:
         raise ConfigError(
@@ -58,7 +66,7 @@ def without(plan: Plan, subtask: str) -> Plan:
 
 
 MISTAKES: Mapping[str, Mistake] = MappingProxyType({"skip": skip})
-"""Every mistake by name: a function from a plan to the plan with the mistake in it."""
+"""Every mistake by name: a function from a plan, randomness and perhaps a sub-task to a plan."""
 
 
 def mistake(name: str) -> Mistake:

@@ -66,6 +66,19 @@ def is_legal(order: Sequence[str]) -> bool:
     return all(before in order[:k] for k, name in enumerate(order) for before in PRECEDENCE[name])
 
 
+def recognisable(steps: Sequence[str]) -> tuple[str, ...]:
+    """What physics will recognise of `steps` when every one is carried out.
+
+    Turning off an oven that is off, or stirring an empty cup, is motion without an event.
+    """
+    return tuple(
+        name
+        for k, name in enumerate(steps)
+        if not (name == "turn_off_oven" and "turn_on_oven" not in steps[:k])
+        and not (name == "stir" and not {"add_water", "add_milk"} & set(steps[:k]))
+    )
+
+
 def next_correct(done: Sequence[str]) -> str | None:
     """The reference's next sub-task: the first of Seq_1 not done yet; None when all are done.
 

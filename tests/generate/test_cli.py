@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
         (["--mistakes", "sneeze"], "Unknown mistake 'sneeze'; choose skip."),
         (
             ["--mistakes", "skip:many"],
-            "'skip:many' is no mistake with a count; write NAME or NAME:COUNT.",
+            "'skip:many' is no mistake with a count; write NAME[@SUBTASK][:COUNT].",
         ),
         (["--cameras", "back"], "Unknown camera 'back'; choose left, cup, front, top."),
         (["--size", "63"], "The size is 63; choose an even number from 32 to 1024."),

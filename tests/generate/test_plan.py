@@ -102,9 +102,9 @@ def test_mistakes_are_read_as_names_with_counts():
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("skip:two",), "'skip:two' is no mistake with a count; write NAME or NAME:COUNT."),
-        (("skip:-1",), "'skip:-1' is no mistake with a count; write NAME or NAME:COUNT."),
-        (("skip:²",), "'skip:²' is no mistake with a count; write NAME or NAME:COUNT."),
+        (("skip:two",), "'skip:two' is no mistake with a count; write NAME[@SUBTASK][:COUNT]."),
+        (("skip:-1",), "'skip:-1' is no mistake with a count; write NAME[@SUBTASK][:COUNT]."),
+        (("skip:²",), "'skip:²' is no mistake with a count; write NAME[@SUBTASK][:COUNT]."),
         (("skip", "skip:2"), "The mistake 'skip' is given twice; write it once as NAME:COUNT."),
     ],
 )

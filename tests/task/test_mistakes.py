@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from teasim.constants import SUBTASKS
 from teasim.errors import ConfigError
 from teasim.task.mistakes import MISTAKES, Plan, mistake, skip, without
 from teasim.task.recipes import CRITICAL, SEQ_1, SEQ_2, is_legal
@@ -78,3 +79,18 @@ def test_an_unknown_mistake_is_named_with_the_choices():
     with pytest.raises(ConfigError) as error:
         mistake("sneeze")
     assert str(error.value) == f"Unknown mistake 'sneeze'; choose {', '.join(MISTAKES)}."
+
+
+@pytest.mark.parametrize("subtask", SUBTASKS)
+def test_any_sub_task_can_be_skipped_by_name(subtask):
+    plan = mistake("skip")(Plan(SEQ_1), rng(0), subtask)
+    assert set(SEQ_1) - set(plan.steps) == {subtask}
+    assert [m.subtask for m in plan.mistakes] == [subtask]
+
+
+def test_skipping_what_does_not_exist_is_refused_by_name():
+    with pytest.raises(ConfigError, match="Unknown sub-task 'sneeze'; choose turn_on_oven"):
+        mistake("skip")(Plan(SEQ_1), rng(0), "sneeze")
+    without_milk = Plan(tuple(name for name in SEQ_1 if name != "add_milk"))
+    with pytest.raises(ConfigError, match="'add_milk' cannot be skipped in a plan"):
+        mistake("skip")(without_milk, rng(0), "add_milk")

@@ -15,6 +15,7 @@ from teasim.task.recipes import (
     check_subtask,
     is_legal,
     next_correct,
+    recognisable,
 )
 from teasim.task.scoring import judge
 
@@ -116,3 +117,13 @@ def test_an_unknown_sub_task_is_named_with_the_choices():
     with pytest.raises(ConfigError) as error:
         check_subtask("sing")
     assert str(error.value) == f"Unknown sub-task 'sing'; choose {', '.join(SUBTASKS)}."
+
+
+def test_physics_recognises_no_turning_off_of_an_oven_that_is_off():
+    assert recognisable(SEQ_1) == SEQ_1
+    assert recognisable(SEQ_1[1:]) == tuple(s for s in SEQ_1[1:] if s != "turn_off_oven")
+    assert recognisable(("turn_on_oven", "stir", "add_milk", "stir")) == (
+        "turn_on_oven",
+        "add_milk",
+        "stir",
+    )
