@@ -118,8 +118,10 @@ class Arm:
             yield target.copy()
 
     def park(self) -> Motion:
-        """Go back to READY."""
-        yield from self._free(READY[self._side])
+        """Go back to READY and close the hand on the way."""
+        for target in self._free(READY[self._side]):
+            target[self._hand] = 0.0
+            yield target
 
     def reach(self, goal: SE3, opening: float) -> Motion:
         """Free motion, straight in joint space, to `goal`; the hand opens on the way."""

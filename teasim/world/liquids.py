@@ -46,6 +46,7 @@ VESSELS = {
     "sugar_pot": Vessel("sugar", 25.0, 0.023, 0.049),
 }
 CONTENTS = tuple(vessel.content for vessel in VESSELS.values())
+_UPRIGHT = np.cos(np.radians(10))
 
 _COLOURS = {"water": (0.62, 0.76, 0.88), "tea": (0.46, 0.19, 0.05), "milk": (0.97, 0.94, 0.87)}
 _STREAMS = {
@@ -124,7 +125,9 @@ class Liquids:
     def _pour(self, name: str, data: mujoco.MjData, dt: float) -> Stream | None:
         vessel = VESSELS[name]
         rotation = data.xmat[self._vessel_bodies[name]].reshape(3, 3)
-        tilt = np.arccos(np.clip(rotation[2, 2], -1, 1))
+        if rotation[2, 2] > _UPRIGHT:
+            return None  # nothing stands so high in its vessel that it would run out already
+        tilt = float(np.arccos(max(rotation[2, 2], -1.0)))
         above_lip = self.amounts[name] - held_volume(vessel, tilt)
         if above_lip <= 1e-9:
             return None

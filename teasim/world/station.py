@@ -67,7 +67,7 @@ KNOB_RANGE = 0.015
 VESSEL_GAP = 0.18
 """Sugar pot and milk jug stand at least this far apart, for the hand at the jug's handle [m]."""
 
-IN_HOLDER = {"tea_bag": ("tea_bag_holder", 0.001, 0.0), "spoon": ("spoon_holder", 0.002, 0.10)}
+IN_HOLDER = {"tea_bag": ("tea_bag_holder", 0.001, 0.0), "spoon": ("spoon_holder", 0.002, 0.15)}
 """What stands in which holder: holder, height [m], lean [rad]."""
 
 FREE_BODIES = ("kettle", "cup", "milk_jug", "sugar_pot", "tea_bag", "spoon")

@@ -57,6 +57,11 @@ def test_layouts_fill_their_ranges_and_stay_inside(name):
     assert {(p.z, p.tilt) for p in placements} == {(nominal.z, nominal.tilt)}
 
 
+def test_the_ranges_are_three_centimetres_and_ten_degrees():
+    assert (POSITION_RANGE, KNOB_RANGE) == (0.03, 0.015)
+    assert np.degrees(YAW_RANGE) == pytest.approx(10)
+
+
 def test_a_hand_always_fits_between_sugar_pot_and_milk_jug():
     gaps = [layout(seed)["sugar_pot"].y - layout(seed)["milk_jug"].y for seed in range(200)]
     assert min(gaps) >= VESSEL_GAP
