@@ -61,6 +61,8 @@ class EvaluateOptions:
     """Folder for what the policy saw, one frame per decision."""
     env_id: str = "teasim:teasim/TeaMakingSubtasks-v0"
     """Gymnasium id of the environment."""
+    quality: str = "fast"
+    """Look of the pictures, fast or nice; should be that of the pool."""
     max_actions: int = 14
     """Actions after which an episode is cut off."""
     jobs: int = default_jobs()
@@ -111,7 +113,9 @@ def evaluate(argv: Sequence[str]) -> int:
     bar = None if options.min_policy_accuracy is None else Bar(options.min_policy_accuracy)
     check_file(options.json)
     check_file(options.junit)
-    world = EnvironmentConfig(options.env_id, max_actions=options.max_actions)
+    world = EnvironmentConfig(
+        options.env_id, quality=options.quality, max_actions=options.max_actions
+    )
     config = EvaluationConfig(options.episodes, options.seed, world, options.video)
     scores = try_policy(load_policy(options.run), config, jobs=options.jobs)
     if options.json:

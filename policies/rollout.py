@@ -25,7 +25,7 @@ class EnvironmentConfig:
     quality: str = "fast"
     """Rendering quality, fast or nice; should be that of the pool."""
     randomize: bool = True
-    """Vary the start and the look from episode to episode."""
+    """Move and turn the things on the table from episode to episode."""
     max_actions: int = 14
     """Actions after which an episode is cut off."""
 

@@ -25,11 +25,14 @@ def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64
     Rows are matched by `demo_id`, so a pool whose episodes were re-numbered still fits its table.
 
     Raises:
-        ConfigError: `use` is unknown, or the table belongs to another pool, or every weight is 0.
+        ConfigError: `use` is unknown or needs a table, the table belongs to another pool, or it
+            leaves no demonstration.
         PoolError: the table cannot be read.
     """
     if use not in USES:
         raise ConfigError(f"Unknown use '{use}' of weights; choose {', '.join(USES)}.")
+    if table is None and use != "ignore":
+        raise ConfigError(f"Use '{use}' needs a weight table; give one with --weights.")
     if table is None:
         return np.ones(len(pool.episodes))
     rows = {row.demo_id: row for row in read_weight_table(table)}

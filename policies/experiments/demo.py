@@ -4,13 +4,11 @@ The question (the paper, section 4.3): is a policy better when the demonstration
 flags are left out? The labels of the pool are read for scoring the filter only.
 """
 
-import subprocess
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +32,7 @@ from policies.rollout import EnvironmentConfig
 from policies.subtask_policy import SubtaskPolicy
 from policies.weighting import demo_weights
 from teasim import parallel
-from teasim.errors import ConfigError, GenerationError
+from teasim.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.files import write_json
 from teasim.pool.weight_table import read_weight_table
@@ -66,6 +64,11 @@ class DemoConfig:
             raise ConfigError(
                 f"The demo needs {FEWEST_DEMOS} demonstrations or more, "
                 f"not --seq1 {self.seq1} --seq3 {self.seq3}."
+            )
+        if self.seq3 >= self.seq1:
+            raise ConfigError(
+                f"--seq3 {self.seq3} is not fewer than --seq1 {self.seq1}, but the filter takes "
+                "what most demonstrations do for correct; ask for fewer incorrect ones."
             )
         EvaluationConfig(self.episodes)
 
@@ -104,7 +107,7 @@ def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
 
     Raises:
         ConfigError: `out` is in use.
-        GenerationError: the pool could not be generated.
+        TeasimError: the pool could not be generated.
     """
     check_folder(out)
     watch = Stopwatch()
@@ -131,18 +134,15 @@ def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
 
 
 def generate_pool(path: Path, config: DemoConfig, jobs: int) -> Pool:
-    """Generate the pool with the command line, because policies never import the world.
+    """Generate the pool by the verb of the command line: policies never import the world.
 
     Raises:
-        GenerationError: the command failed; its own sentence is on stderr.
+        TeasimError: what the verb says, in its own sentence.
     """
-    command = [sys.executable, "-m", "teasim", "generate", str(path)]
+    (verb,) = entry_points(group="teasim.verbs", name="generate")
     numbers = {"seq1": config.seq1, "seq3": config.seq3, "seed": config.seed, "jobs": jobs}
-    for name, number in numbers.items():
-        command += [f"--{name}", str(number)]
-    code = subprocess.run(command, check=False).returncode
-    if code != 0:
-        raise GenerationError(f"The pool '{path}' could not be generated (exit code {code}).")
+    options = [word for name, number in numbers.items() for word in (f"--{name}", str(number))]
+    verb.load()([str(path), *options])
     return Pool.open(path)
 
 

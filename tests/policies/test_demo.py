@@ -9,7 +9,7 @@ from policies.cli import demo as demo_verb
 from policies.experiments import demo
 from policies.experiments.demo import ALL, KEPT, DemoConfig, run_demo
 from policies.rollout import EnvironmentConfig
-from teasim.errors import ConfigError, GenerationError
+from teasim.errors import ConfigError, PoolError
 from tests.policies.conftest import WITHOUT_TEA_BAG
 from tests.policies.fakes import FAKE_ID, SEQ_1, make_fake_pool
 
@@ -88,11 +88,20 @@ def test_a_pool_too_small_to_filter_is_found_before_the_work(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_failed_generation_is_one_sentence(tmp_path, capfd):
+def test_more_incorrect_demonstrations_than_correct_ones_are_refused(tmp_path):
+    with pytest.raises(ConfigError) as error:
+        demo_verb(["-o", str(tmp_path / "out"), "--seq1", "2", "--seq3", "3"])
+    assert str(error.value) == (
+        "--seq3 3 is not fewer than --seq1 2, but the filter takes what most demonstrations do "
+        "for correct; ask for fewer incorrect ones."
+    )
+
+
+def test_a_failed_generation_says_its_own_sentence(tmp_path):
     (tmp_path / "pool").write_text("in the way")
-    with pytest.raises(GenerationError) as error:
+    with pytest.raises(PoolError) as error:
         demo.generate_pool(tmp_path / "pool", CONFIG, 1)
     assert str(error.value) == (
-        f"The pool '{tmp_path / 'pool'}' could not be generated (exit code 2)."
+        f"'{tmp_path / 'pool'}' is a file; choose a folder that is new or empty."
     )
-    assert capfd.readouterr().err.startswith("teasim: ")
+    assert (tmp_path / "pool").read_text() == "in the way"

@@ -28,7 +28,7 @@ def table(tmp_path):
 
 
 def test_no_table_is_weight_1(fake_pool):
-    np.testing.assert_array_equal(demo_weights(fake_pool, None, "discard"), np.ones(7))
+    np.testing.assert_array_equal(demo_weights(fake_pool, None, "ignore"), np.ones(7))
 
 
 @pytest.mark.parametrize(
@@ -57,6 +57,12 @@ def sentence(*arguments):
 def test_an_unknown_use_names_the_choices(fake_pool):
     assert sentence(fake_pool, None, "drop") == (
         "Unknown use 'drop' of weights; choose discard, weight, ignore."
+    )
+
+
+def test_a_use_without_a_table_is_refused(fake_pool):
+    assert sentence(fake_pool, None, "weight") == (
+        "Use 'weight' needs a weight table; give one with --weights."
     )
 
 
