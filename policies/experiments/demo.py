@@ -55,8 +55,10 @@ class DemoConfig:
     """Seed of the pool, the filter and the learner."""
     frames_per_segment: int = 16
     """Frames the filter looks at in each segment; fewer than its default, for speed."""
-    environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
-    """The world the policies are tried out in."""
+    environment: EnvironmentConfig = field(
+        default_factory=partial(EnvironmentConfig, max_actions=10)
+    )
+    """The world the policies are tried out in; 7 actions make tea, and who needs 3 more is lost."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a pool that cannot be filtered, or no episode."""
