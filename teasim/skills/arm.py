@@ -33,7 +33,7 @@ APPROACH = 0.07
 """Length of the straight way in to a grasp and out again [m]."""
 SPEED_MARGIN = 0.85
 """Share of the joints' largest speeds that a plan may use."""
-_REPLANS = 4
+_REPLANS = 10
 _REHEARSAL_SAMPLES = 12
 _LARGEST_TURN = 0.30  # more than this between two samples is a jump to another elbow position [rad]
 
@@ -147,7 +147,7 @@ class Arm:
             if excess <= 1:
                 yield from self._play(plan)
                 return
-            count = int(np.ceil(count * min(excess * 1.05, 3.0)))
+            count = int(np.ceil(count * min(max(1.05 * excess, 1.15), 3.0)))
         raise SkillError(
             f"The {self._side} arm cannot follow a path within its joint speeds; "
             "move the object nearer to its nominal place."

@@ -96,6 +96,8 @@ class Liquids:
         self._vessel_bodies = {name: model.body(body_name(name)).id for name in VESSELS}
         self._spouts = {name: model.site(f"{name}/spout").id for name in VESSELS}
         self._cup = model.body(body_name("cup")).id
+        painted = [*(f"{name}/content" for name in VESSELS), "cup/content", "cup/sugar", "spill"]
+        self._painted = [model.geom(name).id for name in painted]
         self.reset()
 
     def reset(self) -> None:
@@ -162,7 +164,7 @@ class Liquids:
         whiteness = np.clip(share * (2.2 - self.mixed), 0, 1)
         return np.asarray(brewed + (milk - brewed) * whiteness)
 
-    def paint(self, model: mujoco.MjModel) -> None:
+    def paint(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Write levels and colours into the shapes that show them."""
         for name, vessel in VESSELS.items():
             level = self.amounts[name] * 1e-6 / (np.pi * vessel.radius**2)
@@ -175,6 +177,11 @@ class Liquids:
         spill.pos[:2] = self.spill_place
         spill.size[0] = np.sqrt(max(amount, 0.01) * 1e-6 / (np.pi * 0.001))  # a film of 1 mm
         spill.rgba[3] = 0.8 if amount > 1 else 0.0
+        # Where a shape is in the world is otherwise only found out by the next physics step.
+        for geom in self._painted:
+            body = model.geom_bodyid[geom]
+            offset = data.xmat[body].reshape(3, 3) @ model.geom_pos[geom]
+            data.geom_xpos[geom] = data.xpos[body] + offset
 
     def _paint_cup(self, model: mujoco.MjModel) -> None:
         content, sugar = model.geom("cup/content"), model.geom("cup/sugar")

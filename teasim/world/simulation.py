@@ -121,7 +121,7 @@ class Simulation:
 
     def paint(self) -> None:
         """Bring what can be seen up to date: levels, colours, and the glow of the hob."""
-        self.liquids.paint(self.model)
+        self.liquids.paint(self.model, self.data)
         plate, pilot = self._glow
         on = self.oven_on
         self.model.geom_matid[plate] = -1

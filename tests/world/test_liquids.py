@@ -14,6 +14,7 @@ from teasim.world.liquids import (
     Liquids,
     held_volume,
 )
+from teasim.world.simulation import Simulation
 from teasim.world.station import body_name, nominal_layout, place, station_model
 
 DT = 0.02
@@ -181,12 +182,23 @@ def test_tea_darkens_the_cup_and_milk_whitens_it(table):
 def test_levels_can_be_seen(table):
     model, liquids = table.model, table.liquids
     cup, kettle = model.geom("cup/content"), model.geom("kettle/content")
-    liquids.paint(model)
+    liquids.paint(model, table.data)
     empty, full = cup.pos[2], kettle.pos[2]
     assert (cup.rgba[3], kettle.rgba[3], model.geom("spill").rgba[3]) == (0, 1, 0)
     liquids.amounts["kettle"], liquids.cup["water"], liquids.spilled["water"] = 0.0, 80.0, 20.0
-    liquids.paint(model)
+    liquids.paint(model, table.data)
     assert cup.pos[2] - empty == pytest.approx(80e-6 / (np.pi * CUP_RADIUS**2))
     assert kettle.pos[2] < full
     assert (cup.rgba[3], kettle.rgba[3]) == (1, 0)
     assert model.geom("spill").rgba[3] > 0
+
+
+def test_a_picture_shows_the_level_of_now_and_not_of_the_last_step():
+    simulation = Simulation()
+    simulation.reset(nominal_layout())
+    model, data = simulation.model, simulation.data
+    simulation.liquids.cup["water"] = 120.0
+    simulation.paint()
+    shown = data.geom("cup/content").xpos[2] - data.body("cup/cup").xpos[2]
+    assert shown == pytest.approx(model.geom("cup/content").pos[2], abs=1e-4)
+    assert shown > 0.03
