@@ -49,7 +49,7 @@ class DemoConfig:
     """Correct demonstrations (Seq_1)."""
     seq3: int = 4
     """Incorrect demonstrations (Seq_3)."""
-    episodes: int = 5
+    episodes: int = 4
     """Evaluation episodes per policy and mode."""
     seed: int = 0
     """Seed of the pool, the filter and the learner."""
