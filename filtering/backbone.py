@@ -143,13 +143,12 @@ def describe_frames(frames: Frames) -> NDArray[np.float32]:
 
     Uses one thread: processes are the parallelism, and the result does not depend on their number.
     """
-    network = load_backbone()
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         with torch.inference_mode():
             parts = [
-                _describe_batch(network, frames[first : first + BATCH])
+                _describe_batch(frames[first : first + BATCH])
                 for first in range(0, len(frames), BATCH)
             ]
     finally:
@@ -157,11 +156,20 @@ def describe_frames(frames: Frames) -> NDArray[np.float32]:
     return np.concatenate(parts)
 
 
-def _describe_batch(network: EfficientNetLite0, frames: Frames) -> NDArray[np.float32]:
+def feature_maps(frames: Frames) -> list[Tensor]:
+    """Feature maps of TAPS for frames (n, H, W, 3): (n, 112, H/16, W/16), (n, 320, H/32, W/32).
+
+    One batch: memory grows with n, so give at most BATCH frames at a time.
+    """
     images = torch.from_numpy(np.ascontiguousarray(frames)).permute(0, 3, 1, 2)
     scaled = (images.to(torch.float32) - 127.0) / 128.0
+    maps: list[Tensor] = load_backbone()(scaled.contiguous(memory_format=torch.channels_last))
+    return maps
+
+
+def _describe_batch(frames: Frames) -> NDArray[np.float32]:
     pooled = []
-    for feature_map in network(scaled.contiguous(memory_format=torch.channels_last)):
+    for feature_map in feature_maps(frames):
         pooled += [feature_map.mean(dim=(2, 3)), feature_map.amax(dim=(2, 3))]
     result: NDArray[np.float32] = torch.cat(pooled, dim=1).numpy()
     return result

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from filtering.backbone import BATCH, load_backbone
+from filtering.backbone import BATCH, feature_maps
 from policies.networks import one_thread
 
 Maps = NDArray[np.float16]
@@ -34,13 +34,9 @@ def camera_maps(pixels: Mapping[str, NDArray[np.uint8]], cameras: tuple[str, ...
 
 def _maps(frames: NDArray[np.uint8]) -> Maps:
     """Feature maps (n, C, H / 16, W / 16) of frames (n, H, W, 3)."""
-    batches = [_batch_maps(frames[first : first + BATCH]) for first in range(0, len(frames), BATCH)]
+    batches = [
+        feature_maps(frames[first : first + BATCH])[0].half()
+        for first in range(0, len(frames), BATCH)
+    ]
     maps: Maps = torch.cat(batches).numpy()
     return maps
-
-
-def _batch_maps(frames: NDArray[np.uint8]) -> torch.Tensor:
-    images = torch.from_numpy(np.ascontiguousarray(frames)).permute(0, 3, 1, 2)
-    scaled = (images.to(torch.float32) - 127.0) / 128.0
-    taps: list[torch.Tensor] = load_backbone()(scaled.contiguous(memory_format=torch.channels_last))
-    return taps[0].half()

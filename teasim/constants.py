@@ -3,9 +3,9 @@
 from importlib.resources import files
 from pathlib import Path
 
-PHYSICS_TIMESTEP = 0.002
+PHYSICS_TIMESTEP = 0.0025
 """Length of one physics step [s]."""
-STEPS_PER_UPDATE = 10
+STEPS_PER_UPDATE = 8
 """Physics steps between two updates of the motor targets and the liquids (50 Hz)."""
 UPDATES_PER_CONTROL = 5
 """Updates in one control step: control runs at 10 Hz, and one control step is one video frame."""

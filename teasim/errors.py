@@ -27,3 +27,7 @@ class GenerationError(TeasimError):
 
 class CheckpointError(TeasimError):
     """A saved policy is missing, damaged, or was made for another observation or action space."""
+
+
+class WorkerError(TeasimError):
+    """A worker process was killed from outside before its work was done."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from teasim.constants import FPS, STATE_NAMES, SUBTASKS
 from teasim.errors import ConfigError, GenerationError, SkillError
+from teasim.gl import choose_gl
 from teasim.parallel import check_workers, run
 from teasim.pool import (
     EpisodeRecord,
@@ -115,6 +116,7 @@ def generate(
         RenderError: no headless OpenGL back end works.
     """
     check_workers(jobs, backend)
+    choose_gl()  # without it nothing can be filmed, so nothing is begun
     plans = plan_pool(config)
     header = pool_header(config)
     claim_folder(Path(root), header)

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 from tqdm import tqdm
 
-from teasim.errors import ConfigError
+from teasim.errors import ConfigError, WorkerError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -46,15 +47,22 @@ def run(
 
     Raises:
         ConfigError: see `check_workers`, or the back end's package is not installed.
+        WorkerError: a process was killed from outside, most often for want of memory.
     """
     check_workers(jobs, backend)
     show = sys.stderr.isatty() if progress is None else progress
     bar = tqdm(total=len(items), desc=description, disable=not show, file=sys.stderr, leave=False)
     with bar:
         results = []
-        for result in _results(function, items, jobs, backend):
-            results.append(result)
-            bar.update()
+        try:
+            for result in _results(function, items, jobs, backend):
+                results.append(result)
+                bar.update()
+        except TerminatedWorkerError as error:
+            raise WorkerError(
+                f"A worker process was killed after {len(results)} of {len(items)} {description}, "
+                "most often for want of memory; run the same command again with fewer --jobs."
+            ) from error
     return results
 
 

@@ -11,7 +11,7 @@ from teasim.world.station import body_name
 
 OPENING = 0.024
 """Opening of the gripper around the handle [m]."""
-TIP_HEIGHT = 0.010
+TIP_HEIGHT = 0.016
 """Height of the spoon's tip above the cup's underside while stirring [m]."""
 CLEAR_HEIGHT = 0.10
 """Height of the spoon's tip on its way [m]: above the rim and above the holder."""
@@ -43,11 +43,14 @@ def stir(arm: Arm) -> Motion:
     yield from arm.line(hand(standing, 0.002 * UP), arm.APPROACH_SPEED)
     yield from arm.line(hand(standing, CLEAR_HEIGHT * UP))
     yield from arm.line(hand(cup, CLEAR_HEIGHT * UP))
-    yield from arm.line(hand(cup, TIP_HEIGHT * UP), 0.25)
-    yield from arm.line(hand(cup, _circle(0.0)))
+    start = _beside_bag(simulation)
+    yield from arm.line(hand(cup, _circle(start) + (CLEAR_HEIGHT - TIP_HEIGHT) * UP))
+    yield from arm.line(hand(cup, _circle(start)), 0.25)
     turns = arm.style.stir_turns
     seconds = turns / TURNS_PER_SECOND * arm.style.tempo
-    yield from arm.path(lambda share: hand(cup, _circle(turns * share)), seconds, eased=False)
+    yield from arm.path(
+        lambda share: hand(cup, _circle(start + 2 * np.pi * turns * share)), seconds, eased=False
+    )
     yield from arm.line(hand(cup, TIP_HEIGHT * UP))
     yield from arm.line(hand(cup, CLEAR_HEIGHT * UP), 0.25)
     yield from arm.line(hand(standing, CLEAR_HEIGHT * UP))
@@ -56,8 +59,16 @@ def stir(arm: Arm) -> Motion:
     yield from arm.park()
 
 
-def _circle(turns: float) -> np.ndarray:
-    angle = 2 * np.pi * turns
+def _beside_bag(simulation: Simulation) -> float:
+    """Angle of the stirring circle at which the spoon goes in without standing on the bag [rad]."""
+    cup = simulation.data.body(body_name("cup")).xpos
+    leaning = (simulation.data.site("tea_bag/grasp").xpos - cup)[:2]
+    flat = simulation.data.body(body_name("tea_bag")).xmat.reshape(3, 3)[:2, 1]
+    away = -leaning if np.linalg.norm(leaning) > RADIUS / 2 else flat
+    return float(np.arctan2(away[1], away[0]))
+
+
+def _circle(angle: float) -> np.ndarray:
     return np.array([RADIUS * np.cos(angle), RADIUS * np.sin(angle), TIP_HEIGHT])
 
 

@@ -11,7 +11,7 @@ OPENING = 0.024
 """Opening of the gripper around the tag [m]."""
 CARRY_HEIGHT = 0.21
 """Height of the hand on its way to the cup [m]: the bag passes above the spoon."""
-DROP_HEIGHT = 0.105
+DROP_HEIGHT = 0.095
 """Height of the hand when it lets go over the cup's underside [m]."""
 
 
