@@ -5,7 +5,7 @@ from functools import cache
 import mujoco
 import numpy as np
 
-from teasim.world.looks import CameraShift, Cloth, Colour, Distractor, Light, Look, Tint
+from teasim.world.looks import CameraShift, Colour, Distractor, Light, Look, Tint
 from teasim.world.station import station_model
 
 _SHOWN, _HIDDEN = 2, 5  # groups of shapes; see assets/tea_station/looks.xml
@@ -26,7 +26,7 @@ def apply_look(model: mujoco.MjModel, look: Look, data: mujoco.MjData | None = N
     """
     _light(model, look.light)
     _surfaces(model, look)
-    _cloth(model, look.cloth)
+    _cloth(model, look.cloth.pattern if look.cloth else "")
     _tints(model, look.tints)
     for camera in range(_original().ncam):
         _camera(model, CameraShift(_original().camera(camera).name))
@@ -46,28 +46,31 @@ def _light(model: mujoco.MjModel, light: Light) -> None:
             getattr(_original().vis.headlight, part) * light.ambient
         )
     aim = before.pos - before.dir * before.pos[2] / before.dir[2]  # where it meets the table
-    rotation = _product(
-        _about(_UP, light.turn), _about(np.cross(-_UP, before.dir), light.lean)
-    )
+    rotation = _product(_about(_UP, light.turn), _about(np.cross(-_UP, before.dir), light.lean))
     lamp.dir = _rotated(before.dir, rotation)
     lamp.pos = aim + _rotated(before.pos - aim, rotation)
 
 
 def _surfaces(model: mujoco.MjModel, look: Look) -> None:
-    table = _original().mat("table").rgba
-    model.mat("table").rgba = table if look.table is None else (*look.table, 1)
-    plain, tiles = _original().mat("floor_plain").rgba, _original().mat("floor").rgba
-    floor = plain if look.floor is None else np.array((*look.floor, 1))
-    model.mat("floor_plain").rgba = floor
-    model.mat("floor").rgba = tiles * floor / plain
+    cloth = look.cloth
+    coloured = {
+        "table": look.table,
+        "table_grain": look.table,
+        "floor_plain": look.floor,
+        "wall": look.wall,
+        "cloth": cloth.colour if cloth else None,
+        "stripe": cloth.stripe if cloth else None,
+    }
+    for name, colour in coloured.items():
+        before = _original().mat(name).rgba
+        model.mat(name).rgba = before if colour is None else (*colour, 1)
+    tiles, plain = _original().mat("floor").rgba, _original().mat("floor_plain").rgba
+    model.mat("floor").rgba = tiles * model.mat("floor_plain").rgba / plain
     for wall in ("wall_back", "wall_right"):
         _show(model, model.geom(wall).id, look.wall is not None)
-    if look.wall is not None:
-        model.mat("wall").rgba = (*look.wall, 1)
 
 
-def _cloth(model: mujoco.MjModel, cloth: Cloth | None) -> None:
-    pattern = "" if cloth is None else cloth.pattern
+def _cloth(model: mujoco.MjModel, pattern: str) -> None:
     shown = {
         "cloth": bool(pattern),
         "cloth_row": pattern in ("stripes", "check"),
@@ -77,9 +80,6 @@ def _cloth(model: mujoco.MjModel, cloth: Cloth | None) -> None:
         part = model.geom(geom).name.rstrip("0123456789").rstrip("_")
         if part in shown:
             _show(model, geom, shown[part])
-    if cloth is not None:
-        model.mat("cloth").rgba = (*cloth.colour, 1)
-        model.mat("stripe").rgba = (*cloth.stripe, 1)
 
 
 def _tints(model: mujoco.MjModel, tints: tuple[Tint, ...]) -> None:
@@ -126,7 +126,10 @@ def _bring_up_to_date(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     data.light_xpos[:], data.light_xdir[:] = still.light_xpos, still.light_xdir
     for geom in range(model.ngeom):
         if model.body(model.geom_bodyid[geom]).name.startswith("distractor_"):
-            data.geom_xpos[geom], data.geom_xmat[geom] = still.geom_xpos[geom], still.geom_xmat[geom]
+            data.geom_xpos[geom], data.geom_xmat[geom] = (
+                still.geom_xpos[geom],
+                still.geom_xmat[geom],
+            )
 
 
 def _show(model: mujoco.MjModel, geom: int, shown: bool) -> None:

@@ -88,8 +88,8 @@ class Zone:
 DISTRACTORS = {
     "plate": Kind(0.055, 0.011),
     "bottle": Kind(0.031, 0.185),
-    "book": Kind(0.057, 0.022),
-    "plant": Kind(0.040, 0.130),
+    "book": Kind(0.059, 0.022),
+    "plant": Kind(0.041, 0.130),
     "box": Kind(0.049, 0.071),
 }
 ZONES = (
