@@ -64,6 +64,7 @@ class StationRenderer:
         if look is not None:
             self.wear(look)
         self._quality, self._size = quality, (height, width)
+        self._far = self._model.vis.map.zfar
         self._set_quality()
         self._renderer = self._start(SMOOTHING if quality == "nice" else 1)
         self._meter: mujoco.Renderer | None = None
@@ -87,6 +88,7 @@ class StationRenderer:
 
     def close(self) -> None:
         """Close the OpenGL context; safe to call twice."""
+        self._model.vis.map.zfar = self._far  # the next renderer may be of the other quality
         self._renderer.close()
         if self._meter is not None:
             self._meter.close()

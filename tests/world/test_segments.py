@@ -80,3 +80,14 @@ def test_streams_walls_cloths_and_distractors_are_told_apart(simulation):
     table = NUMBER["table"]
     assert np.mean((mask == table)[same] == (bare == table)[same]) > 0.995
     assert (mask == NUMBER["background"]).sum() > (bare == NUMBER["background"]).sum()
+
+
+def test_a_quality_leaves_nothing_behind_for_the_next(simulation):
+    pictures = []
+    for quality in ("fast", "nice", "fast"):
+        with StationRenderer(simulation, width=96, height=96, quality=quality) as renderer:
+            pictures.append(renderer.picture("left"))
+            distances = renderer.depths(("left",))["left"]
+            assert distances.shape == pictures[-1].shape[:2] == (96, 96)
+    assert np.array_equal(pictures[0], pictures[2])
+    assert not np.array_equal(pictures[0], pictures[1])
