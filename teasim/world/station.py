@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import PHYSICS_TIMESTEP, assets_folder
+from teasim.world.grain import add_grain
 from teasim.world.yumi import mount_yumi
 
 
@@ -118,6 +119,7 @@ def station_spec() -> mujoco.MjSpec:
     """Station with robot and props at their nominal places."""
     folder = assets_folder()
     spec = mujoco.MjSpec.from_file(str(folder / "tea_station" / "scene.xml"))
+    add_grain(spec)
     mount_yumi(spec)
     layout = nominal_layout()
     for name in (*FREE_BODIES, *_FIXED_BODIES[1:]):
