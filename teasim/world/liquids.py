@@ -49,6 +49,7 @@ CONTENTS = tuple(vessel.content for vessel in VESSELS.values())
 _UPRIGHT = np.cos(np.radians(10))
 
 _COLOURS = {"water": (0.62, 0.76, 0.88), "tea": (0.46, 0.19, 0.05), "milk": (0.97, 0.94, 0.87)}
+_PUDDLES = {"water": (0.45, 0.62, 0.78), "milk": (0.95, 0.93, 0.88), "sugar": (0.97, 0.97, 0.97)}
 _STREAMS = {
     "water": (0.45, 0.70, 0.95, 0.9),
     "milk": (0.98, 0.97, 0.92, 1.0),
@@ -172,16 +173,23 @@ class Liquids:
             content.pos[2] = 0.0035 + level
             content.rgba[3] = 1.0 if self.amounts[name] > 1 else 0.0
         self._paint_cup(model)
-        spill = model.geom("spill")
-        amount = sum(self.spilled.values())
-        spill.pos[:2] = self.spill_place
-        spill.size[0] = np.sqrt(max(amount, 0.01) * 1e-6 / (np.pi * 0.001))  # a film of 1 mm
-        spill.rgba[3] = 0.8 if amount > 1 else 0.0
+        self._paint_spill(model)
         # Where a shape is in the world is otherwise only found out by the next physics step.
         for geom in self._painted:
             body = model.geom_bodyid[geom]
             offset = data.xmat[body].reshape(3, 3) @ model.geom_pos[geom]
             data.geom_xpos[geom] = data.xpos[body] + offset
+
+    def _paint_spill(self, model: mujoco.MjModel) -> None:
+        spill = model.geom("spill")
+        amounts = np.array(list(self.spilled.values()))
+        amount = amounts.sum()
+        thickness = 0.001 + 0.004 * self.spilled["sugar"] / max(amount, 1.0)  # sugar heaps up
+        spill.pos[:2] = self.spill_place
+        spill.size[0] = np.sqrt(max(amount, 0.01) * 1e-6 / (np.pi * thickness))
+        colours = np.array([_PUDDLES[content] for content in self.spilled])
+        spill.rgba[:3] = amounts @ colours / max(amount, 0.01)
+        spill.rgba[3] = 0.85 if amount > 1 else 0.0
 
     def _paint_cup(self, model: mujoco.MjModel) -> None:
         content, sugar = model.geom("cup/content"), model.geom("cup/sugar")
