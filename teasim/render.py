@@ -1,5 +1,6 @@
 """Pictures of the station, rendered off screen; OpenGL is started lazily, once per process."""
 
+import os
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
@@ -21,6 +22,7 @@ LARGEST_SIDE = 4096
 """Largest width and height of a picture [pixels]."""
 _PLAIN_FLOOR = (0.50, 0.51, 0.53, 1.0)
 _SHOWN_GROUPS = (0, 1, 2)
+_processes: set[int] = set()  # that started OpenGL: this one, or one it was forked from
 
 
 class StationRenderer:
@@ -37,9 +39,10 @@ class StationRenderer:
 
         Raises:
             ConfigError: unknown quality, or a side out of range.
-            RenderError: no headless back end works.
+            RenderError: no headless back end works, or none can after a fork.
         """
         check_look(width, height, quality)
+        check_not_forked()
         choose_gl()
         self._simulation = simulation
         self._model = simulation.model
@@ -100,6 +103,20 @@ class StationRenderer:
         if not nice:
             floor.matid = -1  # its texture is a quarter of the cost of a frame
             floor.rgba = _PLAIN_FLOOR
+
+
+def check_not_forked() -> None:
+    """Refuse what would hang: OpenGL's threads do not survive a fork.
+
+    Raises:
+        RenderError: a process that this one was forked from has rendered.
+    """
+    if _processes and os.getpid() not in _processes:
+        raise RenderError(
+            "This process was forked from one that has rendered, which OpenGL does not survive; "
+            "start it with multiprocessing's 'spawn' (vector_kwargs={'context': 'spawn'})."
+        )
+    _processes.add(os.getpid())
 
 
 def check_cameras(cameras: Sequence[str]) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
-"""One demonstration carried out in physics, frame by frame, with the physics' own verdict."""
+"""One demonstration carried out in physics, frame by frame, and carried out again from its log."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ class Step:
     position: int
     """Index of that sub-task in the demonstration."""
     target: np.ndarray
-    """Joint angles [rad] and gripper openings [m] to go to (16,)."""
+    """Joint angles [rad] and gripper openings [m] to go to (16,), float32 as they are logged."""
 
 
 def demonstrate(
@@ -34,7 +34,8 @@ def demonstrate(
     """Reset the station to a random layout and carry out `subtasks` in order.
 
     The simulation stands before each yielded step, so a caller can look at it, and is advanced
-    when the next one is asked for.
+    when the next one is asked for. It goes to the float32 targets that a log holds, so `replay`
+    gives the same bits.
 
     Raises:
         SkillError: a sub-task cannot be done from the state the ones before it left.
@@ -43,11 +44,32 @@ def demonstrate(
     style = sample_style(rng)
     for position, subtask in enumerate(subtasks):
         for target in perform(subtask, simulation, varied(style, rng)):
-            yield Step(subtask, position, target)
-            simulation.step(target)
+            logged = target.astype(np.float32)
+            yield Step(subtask, position, logged)
+            simulation.step(logged)
+    rest = simulation.target.astype(np.float32)
     for _ in range(round(FINAL_REST / CONTROL_TIMESTEP)):
-        yield Step(subtasks[-1], len(subtasks) - 1, simulation.target)
-        simulation.step(simulation.target)
+        yield Step(subtasks[-1], len(subtasks) - 1, rest)
+        simulation.step(rest)
+
+
+def replay(
+    simulation: Simulation, targets: Iterable[np.ndarray], rng: np.random.Generator
+) -> Iterator[np.ndarray]:
+    """Carry a demonstration out again from its log.
+
+    The simulation stands before each yielded target, as in `demonstrate`, and after the last one
+    when the iterator is exhausted.
+
+    Args:
+        simulation: the station; it is reset to the layout that `rng` draws.
+        targets: the log, the column `action` of a pool: angles [rad] and openings [m] (16,) each.
+        rng: a generator as `demonstrate` was given it; `teasim.generate.demo_rng` for a pool's.
+    """
+    simulation.reset(sample_layout(rng))
+    for target in targets:
+        yield target
+        simulation.step(target)
 
 
 def run_subtask(simulation: Simulation, subtask: str, style: Style) -> int:
