@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from numbers import Real
 from typing import Any
 
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
@@ -34,7 +35,8 @@ class RewardWeights:
 
     def __post_init__(self) -> None:
         for name, weight in asdict(self).items():
-            if isinstance(weight, bool | str) or not math.isfinite(weight):
+            number = isinstance(weight, Real) and not isinstance(weight, bool)
+            if not number or not math.isfinite(weight):
                 raise ConfigError(f"The reward weight of '{name}' is {weight}; give a number.")
 
     @classmethod
