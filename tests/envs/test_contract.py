@@ -54,34 +54,6 @@ def test_the_checker_of_gymnasium_finds_nothing_with_several_cameras(make, name)
 
 
 @each_env
-@pytest.mark.parametrize("view", [*VIEWS, "several"])
-@pytest.mark.usefixtures("quick")
-def test_observations_are_finite_new_and_as_announced(make, name, view):
-    env = make(name, **VIEWS.get(view, SEVERAL))
-    first, _ = env.reset(seed=0)
-    second, *_ = env.step(env.action_space.sample())
-    assert first in env.observation_space
-    assert second in env.observation_space
-    ours, theirs = leaves(first), leaves(second)
-    assert ours.keys() == theirs.keys()
-    for key in ours:
-        assert np.isfinite(ours[key]).all()
-        assert np.ptp(ours[key]) > 0, key
-        assert not np.shares_memory(ours[key], theirs[key])
-
-
-def leaves(observation: dict, path: str = "") -> dict[str, np.ndarray]:
-    """All arrays of a nested observation by their path."""
-    found: dict[str, np.ndarray] = {}
-    for key, value in observation.items():
-        if isinstance(value, dict):
-            found |= leaves(value, f"{path}{key}/")
-        else:
-            found[f"{path}{key}"] = value
-    return found
-
-
-@each_env
 def test_observation_keys_are_the_conventional_ones(make, name):
     spaces = {view: make(name, **kwargs).observation_space for view, kwargs in VIEWS.items()}
     assert set(spaces["state"].spaces) == {"agent_pos", "environment_state"}

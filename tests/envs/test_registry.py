@@ -15,7 +15,8 @@ from teasim.errors import ConfigError
 
 VARIANTS = {control: ("TeaMaking", {"control": control}) for control in CONTROLS}
 VARIANTS["subtasks"] = ("TeaMakingSubtasks", {})
-SMALL = {"cameras": ("cup",), "width": 32, "height": 24, "render_mode": "rgb_array"}
+SMALL = {"width": 32, "height": 24, "render_mode": "rgb_array"}
+CAMERAS = {"state": ("cup",), "pixels": ("cup",), "pixels_agent_pos": ("cup", "left")}
 
 each_variant = pytest.mark.parametrize("variant", VARIANTS)
 each_view = pytest.mark.parametrize("view", OBS_TYPES)
@@ -31,7 +32,7 @@ def build():
         if (variant, view, copy) not in made:
             name, kwargs = VARIANTS[variant]
             made[variant, view, copy] = gymnasium.make(
-                f"teasim:teasim/{name}-v0", obs_type=view, **SMALL, **kwargs
+                f"teasim:teasim/{name}-v0", obs_type=view, cameras=CAMERAS[view], **SMALL, **kwargs
             )
         return made[variant, view, copy]
 
@@ -63,6 +64,29 @@ def episode(env: gymnasium.Env, actions: list) -> list:
     return [[bits(part) for part in env.reset(seed=3)], *run(env, actions)]
 
 
+def leaves(observation: dict, path: str = "") -> dict[str, np.ndarray]:
+    """All arrays of a nested observation by their path."""
+    found: dict[str, np.ndarray] = {}
+    for key, value in observation.items():
+        if isinstance(value, dict):
+            found |= leaves(value, f"{path}{key}/")
+        else:
+            found[f"{path}{key}"] = value
+    return found
+
+
+def check_observations(env: gymnasium.Env, before: dict, after: dict) -> None:
+    """As announced, finite, not blank, and in memory of their own."""
+    assert before in env.observation_space
+    assert after in env.observation_space
+    ours, theirs = leaves(before), leaves(after)
+    assert ours.keys() == theirs.keys()
+    for key in ours:
+        assert np.isfinite(theirs[key]).all()
+        assert np.ptp(theirs[key]) > 0, key
+        assert not np.shares_memory(ours[key], theirs[key])
+
+
 def test_no_registered_environment_is_left_out():
     register_envs()
     ours = {name for name in gymnasium.registry if name.startswith("teasim/")}
@@ -75,12 +99,12 @@ def test_what_comes_back_is_what_the_spaces_and_the_specification_say(build, var
     env = build(variant, view)
     assert env.spec.id == f"teasim/{VARIANTS[variant][0]}-v0"
     observation, info = env.reset(seed=0)
-    assert observation in env.observation_space
     assert isinstance(info, dict)
     for action in actions_for(env, 2):
         assert action in env.action_space
+        before = observation
         observation, reward, terminated, truncated, _ = env.step(action)
-        assert observation in env.observation_space
+        check_observations(env, before, observation)
         assert [type(x) for x in (reward, terminated, truncated)] == [float, bool, bool]
         assert np.isfinite(reward)
     picture = env.render()

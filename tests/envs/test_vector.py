@@ -1,10 +1,13 @@
 """Several environments at once are copies of the single one, in this process or in others."""
 
+import os
+
 import gymnasium
 import numpy as np
 import pytest
 
 from teasim.envs.registration import register_envs
+from teasim.errors import RenderError
 
 VIEW = {
     "obs_type": "pixels",
@@ -40,7 +43,9 @@ def start_and_step(mode: str, name: str) -> tuple:
         pytest.param("async", "TeaMakingSubtasks", marks=pytest.mark.slow),
     ],
 )
-def test_vector_environments_are_copies_of_the_single_one(make, mode, name):
+def test_vector_environments_are_copies_of_the_single_one(make, request, mode, name):
+    if mode == "sync":  # other processes have no patched skills
+        request.getfixturevalue("quick")
     first, second, rewards, ends, info, pictures = start_and_step(mode, name)
     assert isinstance(pictures, tuple)
     assert not np.any(ends)
@@ -57,3 +62,15 @@ def test_vector_environments_are_copies_of_the_single_one(make, mode, name):
         for term, value in single["reward_terms"].items():
             assert info["reward_terms"][term][k] == value
     assert (first[0] != first[1]).any()
+
+
+def test_a_fork_of_a_process_that_renders_is_refused_instead_of_hanging(monkeypatch, make):
+    parent = os.getpid() + 1
+    monkeypatch.setattr("teasim.render._processes", {parent})
+    env = make("TeaMaking", **VIEW)
+    with pytest.raises(RenderError) as error:
+        env.reset(seed=0)
+    assert str(error.value) == (
+        "This process was forked from one that has rendered, which OpenGL does not survive; "
+        "start it with multiprocessing's 'spawn' (vector_kwargs={'context': 'spawn'})."
+    )
