@@ -1,5 +1,6 @@
 """Pictures of the station, rendered off screen; OpenGL is started lazily, once per process."""
 
+import os
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
@@ -33,6 +34,7 @@ _PLAIN = {"floor": "floor_plain", "table": "table"}
 _SHOWN_GROUPS = (0, 1, 2)
 _GEOM, _DECORATION = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _STREAM = SEGMENT_NAMES.index("stream")
+_processes: set[int] = set()  # that started OpenGL: this one, or one it was forked from
 
 
 class StationRenderer:
@@ -55,9 +57,10 @@ class StationRenderer:
 
         Raises:
             ConfigError: unknown quality, or a side out of range.
-            RenderError: no headless back end works.
+            RenderError: no headless back end works, or none can after a fork.
         """
         check_look(width, height, quality)
+        check_not_forked()
         choose_gl()
         self._simulation = simulation
         self._model = simulation.model
@@ -187,6 +190,20 @@ class StationRenderer:
         surfaces = _TEXTURED if nice else _PLAIN
         for geom, material in surfaces.items():
             model.geom(geom).matid = model.mat(material).id
+
+
+def check_not_forked() -> None:
+    """Refuse what would hang: OpenGL's threads do not survive a fork.
+
+    Raises:
+        RenderError: a process that this one was forked from has rendered.
+    """
+    if _processes and os.getpid() not in _processes:
+        raise RenderError(
+            "This process was forked from one that has rendered, which OpenGL does not survive; "
+            "start it with multiprocessing's 'spawn' (vector_kwargs={'context': 'spawn'})."
+        )
+    _processes.add(os.getpid())
 
 
 def check_cameras(cameras: Sequence[str]) -> tuple[str, ...]:

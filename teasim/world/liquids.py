@@ -6,6 +6,7 @@ from functools import cache
 import mujoco
 import numpy as np
 
+from teasim.world.state import Saved
 from teasim.world.station import body_name
 
 FLOW_LIMIT = 40.0
@@ -86,12 +87,14 @@ def held_volume(vessel: Vessel, tilt: float) -> float:
     return float(np.interp(tilt, tilts, volumes))
 
 
-class Liquids:
+class Liquids(Saved):
     """Amounts in the vessels, in the cup and on the table.
 
     Masses of the bodies stay what they are: the 25 to 100 g that move are within what the grasps
     hold, and changing a body's mass in mid-contact makes light vessels jump.
     """
+
+    SAVED = ("amounts", "cup", "spilled", "spill_place", "tea", "mixed", "streams")
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._vessel_bodies = {name: model.body(body_name(name)).id for name in VESSELS}
@@ -118,7 +121,10 @@ class Liquids:
 
     def update(self, data: mujoco.MjData, dt: float, *, brewing: bool, stirring: bool) -> None:
         """Let everything flow, brew and mix for `dt` seconds."""
-        streams = [self._pour(name, data, dt) for name in VESSELS]
+        # What stands upright is not so full that it would run out.
+        lean = data.xmat[:, 8]
+        tilted = [name for name, body in self._vessel_bodies.items() if lean[body] <= _UPRIGHT]
+        streams = [self._pour(name, data, dt) for name in tilted]
         self.streams = tuple(stream for stream in streams if stream is not None)
         if brewing and self.cup["water"] > 0:
             self.tea += (1 - self.tea) * dt / (STIR_TIME if stirring else BREW_TIME)
@@ -128,8 +134,6 @@ class Liquids:
     def _pour(self, name: str, data: mujoco.MjData, dt: float) -> Stream | None:
         vessel = VESSELS[name]
         rotation = data.xmat[self._vessel_bodies[name]].reshape(3, 3)
-        if rotation[2, 2] > _UPRIGHT:
-            return None  # nothing stands so high in its vessel that it would run out already
         tilt = float(np.arccos(max(rotation[2, 2], -1.0)))
         above_lip = self.amounts[name] - held_volume(vessel, tilt)
         if above_lip <= 1e-9:

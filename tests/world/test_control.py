@@ -99,7 +99,9 @@ def test_fingers_keep_their_speed_limit(simulation, arm, start, end):
 def test_a_squeeze_of_nothing_presses_with_20_newtons_a_finger_and_closes(simulation):
     hand = STATE_NAMES.index("left_gripper")
     drive(simulation, hand, GRIPPER_SQUEEZE, seconds=2.0)
-    assert simulation.data.actuator("left_gripper").force[0] == pytest.approx(-40, abs=3)  # the pads give way a little
+    assert simulation.data.actuator("left_gripper").force[0] == pytest.approx(
+        -40, abs=3
+    )  # the pads give way a little
     assert simulation.joint_state()[hand] == pytest.approx(0, abs=2e-3)
 
 
