@@ -7,6 +7,7 @@ from teasim.envs.actions import DELTA_SHARE
 from teasim.generate import demo_rng
 from teasim.rollout import demonstrate, replay
 from teasim.skills.arm import SPEED_MARGIN
+from teasim.task.mistakes import Plan
 from teasim.world.simulation import Simulation
 
 SEED = 4
@@ -28,7 +29,7 @@ def log():
     """Targets, all states, and the joints and the station at the end."""
     simulation = Simulation()
     targets, seen = [], []
-    for step in demonstrate(simulation, SUBTASKS, generator()):
+    for step in demonstrate(simulation, Plan(SUBTASKS), generator()):
         targets.append(step.target)
         seen.append(states(simulation))
     assert simulation.subtasks_done == SUBTASKS

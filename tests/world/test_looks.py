@@ -12,6 +12,7 @@ from teasim.constants import CAMERAS, SUBTASKS
 from teasim.errors import ConfigError
 from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
+from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1
 from teasim.world import looks
 from teasim.world.dressing import apply_look
@@ -165,7 +166,7 @@ def test_nothing_that_moves_comes_into_a_zone():
         mesh = model.geom_dataid[geom]
         start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
         corners[geom] = model.mesh_vert[start : start + count]
-    for count, step in enumerate(demonstrate(simulation, SEQ_1, np.random.default_rng(2))):
+    for count, step in enumerate(demonstrate(simulation, Plan(SEQ_1), np.random.default_rng(2))):
         if count % 3:
             continue  # nothing is so quick that it would pass in between
         points = np.concatenate(
