@@ -24,6 +24,7 @@ STIR_TURNS = 2.0
 STIR_RADIUS = 0.004
 """Nearer to the cup's axis the direction of the spoon says nothing [m]."""
 
+_NEAR = 2 * math.hypot(BAG_RADIUS, RIM_HEIGHT)  # nothing in the cup is farther from its foot [m]
 _ADDED = {"water": "add_water", "milk": "add_milk", "sugar": "add_sugar"}
 
 
@@ -116,10 +117,13 @@ class Recogniser(Saved):
             self._record("stir", data)
 
     def _in_cup_frame(self, point: np.ndarray, data: mujoco.MjData) -> tuple[float, float, float]:
+        """A point's place in the cup [m]; infinitely far if it is not near."""
         # For three numbers Python is three times as fast as NumPy.
-        dx, dy, dz = (
-            p - c for p, c in zip(point.tolist(), data.xpos[self._cup].tolist(), strict=True)
-        )
+        px, py, pz = point.tolist()
+        cx, cy, cz = data.xpos[self._cup].tolist()
+        dx, dy, dz = px - cx, py - cy, pz - cz
+        if dx * dx + dy * dy + dz * dz > _NEAR * _NEAR:
+            return math.inf, math.inf, math.inf
         a, b, c, d, e, f, g, h, i = data.xmat[self._cup].tolist()
         return a * dx + d * dy + g * dz, b * dx + e * dy + h * dz, c * dx + f * dy + i * dz
 
