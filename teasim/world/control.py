@@ -3,10 +3,9 @@
 import mujoco
 import numpy as np
 
-from teasim.constants import ARM_JOINTS, ARMS, CONTROL_TIMESTEP, UPDATES_PER_CONTROL
+from teasim.constants import ARMS, CONTROL_TIMESTEP, UPDATES_PER_CONTROL
+from teasim.world.embodiments import YUMI, Embodiment
 
-FINGER_SPEED = 0.025
-"""Speed of each finger [m/s] (ABB servo gripper, default setting)."""
 BLOCKED_LAG = 0.004
 """A closing finger this far behind its command is held by something [m]."""
 
@@ -19,8 +18,10 @@ class Controller:
     and the motors still see a continuous velocity, which they need to carry things without jerks.
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
-        joints = [name for arm in ARMS for name in ARM_JOINTS[arm]]
+    def __init__(self, model: mujoco.MjModel, embodiment: Embodiment = YUMI) -> None:
+        joints = [name for arm in ARMS for name in embodiment.joints[arm]]
+        self._count = len(joints)
+        self._finger_speed = embodiment.finger_speed
         self._arm_actuators = np.array([model.actuator(name).id for name in joints])
         self._finger_actuators = np.array([model.actuator(f"{arm}_gripper").id for arm in ARMS])
         self._joint_addresses = np.array([model.joint(name).qposadr[0] for name in joints])
@@ -31,26 +32,26 @@ class Controller:
         damping = -model.actuator_biasprm[self._arm_actuators, 2]
         self._feedforward = damping / gain  # cancels the lag of a damped position motor [s]
         self._limits = model.actuator_ctrlrange[self._arm_actuators]
-        self._position = np.zeros(14)
-        self._velocity = np.zeros(14)
+        self._position = np.zeros(self._count)
+        self._velocity = np.zeros(self._count)
         self._fingers = np.zeros(2)
 
     def reset(self, data: mujoco.MjData) -> None:
         """Hold the present positions."""
         state = self.measured(data)
-        self._position, self._velocity = state[:14].copy(), np.zeros(14)
-        self._fingers = state[14:] / 2
+        self._position, self._velocity = state[: self._count].copy(), np.zeros(self._count)
+        self._fingers = state[self._count :] / 2
 
     def measured(self, data: mujoco.MjData) -> np.ndarray:
-        """Joint angles [rad] and gripper openings [m] (16,), in the order of `STATE_NAMES`."""
+        """Joint angles [rad] and gripper openings [m] (2 n + 2,): right, left, openings."""
         return np.concatenate(
             [data.qpos[self._joint_addresses], 2 * data.qpos[self._finger_addresses]]
         )
 
     def commands(self, target: np.ndarray, data: mujoco.MjData) -> "_Segment":
-        """Start the control step towards `target` (16,)."""
-        goal = np.clip(target[:14], self._limits[:, 0], self._limits[:, 1])
-        segment = _Segment(self, self._position, self._velocity, goal, target[14:] / 2)
+        """Start the control step towards `target` (2 n + 2,)."""
+        goal = np.clip(target[: self._count], self._limits[:, 0], self._limits[:, 1])
+        segment = _Segment(self, self._position, self._velocity, goal, target[self._count :] / 2)
         self._velocity = (goal - self._position) / CONTROL_TIMESTEP
         self._position = goal
         opening = segment.fingers > self._fingers
@@ -86,7 +87,7 @@ class _Segment:
         data.ctrl[control._arm_actuators] = np.clip(position + lead, *control._limits.T)
         # Blocked fingers do not move, so nothing keeps the force from building up at once.
         lag = data.qpos[control._finger_addresses] - control._fingers
-        speed = np.where(lag > BLOCKED_LAG, 10 * FINGER_SPEED, FINGER_SPEED)
+        speed = control._finger_speed * np.where(lag > BLOCKED_LAG, 10, 1)
         stride = speed * CONTROL_TIMESTEP / UPDATES_PER_CONTROL
         control._fingers += np.clip(self.fingers - control._fingers, -stride, stride)
         data.ctrl[control._finger_actuators] = control._fingers
