@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from teasim.constants import CONTROL_TIMESTEP
+from teasim.errors import ConfigError
 from teasim.skills.arm import Style
-from teasim.skills.demonstrators import sample_style, varied
+from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform
 from teasim.world.simulation import Simulation
 from teasim.world.station import sample_layout
@@ -25,24 +26,35 @@ class Step:
     position: int
     """Index of that sub-task in the demonstration."""
     target: np.ndarray
-    """Joint angles [rad] and gripper openings [m] to go to (16,)."""
+    """Joint angles [rad] and openings [m] to go to: (16,) for YuMi, (14,) for a person."""
 
 
 def demonstrate(
-    simulation: Simulation, subtasks: tuple[str, ...], rng: np.random.Generator
+    simulation: Simulation,
+    subtasks: tuple[str, ...],
+    rng: np.random.Generator,
+    participant: Participant = OPERATOR,
 ) -> Iterator[Step]:
-    """Reset the station to a random layout and carry out `subtasks` in order.
+    """Reset the station to a random layout and let `participant` carry out `subtasks` in order.
 
     The simulation stands before each yielded step, so a caller can look at it, and is advanced
     when the next one is asked for.
 
     Raises:
+        ConfigError: the simulation has not the participant's body.
         SkillError: a sub-task cannot be done from the state the ones before it left.
     """
+    if simulation.embodiment.name != participant.embodiment:
+        raise ConfigError(
+            f"{participant.name} works with the embodiment '{participant.embodiment}', "
+            f"the station has '{simulation.embodiment.name}'; choose one for both."
+        )
+    if participant.look is not None:
+        simulation.dress(participant.look)
     simulation.reset(sample_layout(rng))
-    style = sample_style(rng)
+    style = sample_style(rng, participant)
     for position, subtask in enumerate(subtasks):
-        for target in perform(subtask, simulation, varied(style, rng)):
+        for target in perform(subtask, simulation, varied(style, rng, participant)):
             yield Step(subtask, position, target)
             simulation.step(target)
     for _ in range(round(FINAL_REST / CONTROL_TIMESTEP)):
