@@ -116,9 +116,8 @@ def generation(size: int, repeats: int) -> dict[str, float]:
     config = GenerateConfig(seq1=1, size=size)
     (demo,) = plan_pool(config)
     simulation = Simulation()
-    recorded = demonstrate(
-        simulation, demo.plan.steps, np.random.default_rng([config.seed, 1, demo.index, 0])
-    )
+    rng = np.random.default_rng([config.seed, 1, demo.index, 0])
+    recorded = demonstrate(simulation, demo.plan, rng)
     next(recorded)  # the station has come to rest
     recording = Recording.of(simulation)
     for _ in recorded:

@@ -6,15 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from teasim.constants import CONTROL_TIMESTEP
-from teasim.errors import ConfigError
+from teasim.errors import ConfigError, SkillError
 from teasim.skills.arm import Style
 from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform
+from teasim.skills.pace import MATCHED_SECONDS, Pace
+from teasim.task.mistakes import Plan
 from teasim.world.simulation import Simulation
 from teasim.world.station import sample_layout
 
 FINAL_REST = 0.5
-"""The station is shown this long after the last sub-task [s]."""
+"""The station is shown at least this long after the last sub-task [s]."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +33,15 @@ class Step:
 
 def demonstrate(
     simulation: Simulation,
-    subtasks: tuple[str, ...],
+    plan: Plan,
     rng: np.random.Generator,
+    *,
+    match_length: bool = False,
     participant: Participant = OPERATOR,
 ) -> Iterator[Step]:
-    """Reset the station to a random layout and let `participant` carry out `subtasks` in order.
+    """Reset the station to a random layout and let `participant` carry out `plan` step by step.
 
+    With `match_length` it rests in between so that it lasts as long as any other demonstration.
     The simulation stands before each yielded step, so a caller can look at it, and is advanced
     when the next one is asked for.
 
@@ -44,6 +49,25 @@ def demonstrate(
         ConfigError: the simulation has not the participant's body.
         SkillError: a sub-task cannot be done from the state the ones before it left.
     """
+    _take_place(simulation, participant)
+    simulation.reset(sample_layout(rng))
+    style = sample_style(rng, participant)
+    pace = Pace(plan.steps, rng.uniform(*MATCHED_SECONDS), rng) if match_length else None
+    for position, subtask in enumerate(plan.steps):
+        elapsed = float(simulation.data.time)
+        rest = pace.rest(position, elapsed, style) if pace else 0.0
+        yield from _rest(simulation, subtask, position, rest)
+        now = varied(style, rng, participant)
+        for target in perform(subtask, simulation, now, plan.manner(position)):
+            yield Step(subtask, position, target)
+            simulation.step(target)
+    rest = pace.length - float(simulation.data.time) if pace else FINAL_REST
+    if rest < FINAL_REST - CONTROL_TIMESTEP:
+        raise SkillError(f"The demonstration took {FINAL_REST - rest:.1f} s longer than it may.")
+    yield from _rest(simulation, plan.steps[-1], len(plan.steps) - 1, rest)
+
+
+def _take_place(simulation: Simulation, participant: Participant) -> None:
     if simulation.embodiment.name != participant.embodiment:
         raise ConfigError(
             f"{participant.name} works with the embodiment '{participant.embodiment}', "
@@ -51,14 +75,11 @@ def demonstrate(
         )
     if participant.look is not None:
         simulation.dress(participant.look)
-    simulation.reset(sample_layout(rng))
-    style = sample_style(rng, participant)
-    for position, subtask in enumerate(subtasks):
-        for target in perform(subtask, simulation, varied(style, rng, participant)):
-            yield Step(subtask, position, target)
-            simulation.step(target)
-    for _ in range(round(FINAL_REST / CONTROL_TIMESTEP)):
-        yield Step(subtasks[-1], len(subtasks) - 1, simulation.target)
+
+
+def _rest(simulation: Simulation, subtask: str, position: int, seconds: float) -> Iterator[Step]:
+    for _ in range(round(seconds / CONTROL_TIMESTEP)):
+        yield Step(subtask, position, simulation.target)
         simulation.step(simulation.target)
 
 

@@ -26,8 +26,15 @@ class GenerateArguments:
     """Demonstrations in the sub-optimal order (tea bag late)."""
     seq3: int = 0
     """Incorrect demonstrations: one or two of tea bag, water and oven-off left out."""
+    legal: int = 0
+    """Correct demonstrations in a random order that respects what has to wait for what."""
     mistakes: tuple[str, ...] = ()
-    """Further incorrect demonstrations, as NAME[@SUBTASK][:COUNT], e.g. skip@add_milk:2."""
+    """Further incorrect demonstrations, as NAME[@SUBTASK][+NAME...][:COUNT], e.g. skip@add_milk:2;
+    skip, wrong_order, repeat, ineffective, wrong_object, abandoned."""
+    optional: tuple[str, ...] = ()
+    """Ingredients that half of the demonstrations do without, rightly: add_sugar, add_milk."""
+    match_length: bool = False
+    """Draw out all demonstrations so that their length says nothing about them."""
     cameras: tuple[str, ...] = ("left", "cup")
     """Cameras that film: left, cup, front, top."""
     size: int = 224
@@ -52,7 +59,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         seq1=arguments.seq1,
         seq2=arguments.seq2,
         seq3=arguments.seq3,
+        legal=arguments.legal,
         mistakes=mistakes,
+        optional=arguments.optional,
+        match_length=arguments.match_length,
         cameras=arguments.cameras,
         size=arguments.size,
         quality=arguments.quality,
@@ -70,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def parse_mistakes(words: Sequence[str]) -> tuple[tuple[str, int], ...]:
-    """Turn NAME[@SUBTASK][:COUNT] into counts.
+    """Turn NAME[@SUBTASK][+NAME...][:COUNT] into counts.
 
     Raises:
         ConfigError: a count is not a number, or a name is given twice.
@@ -81,6 +91,8 @@ def parse_mistakes(words: Sequence[str]) -> tuple[tuple[str, int], ...]:
         if name in counts:
             raise ConfigError(f"The mistake '{name}' is given twice; write it once as NAME:COUNT.")
         if count and not count.isdecimal():
-            raise ConfigError(f"'{word}' is no mistake with a count; write NAME[@SUBTASK][:COUNT].")
+            raise ConfigError(
+                f"'{word}' is no mistake with a count; write NAME[@SUBTASK][+NAME...][:COUNT]."
+            )
         counts[name] = int(count or 1)
     return tuple(counts.items())

@@ -21,6 +21,8 @@ class InspectConfig:
 
     pool: Annotated[Path, tyro.conf.Positional]
     """Folder of a pool: any LeRobot v3.0 data set."""
+    leakage: bool = False
+    """Also tell what gives the incorrect demonstrations away: 0.5 is nothing, 0 and 1 are all."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -30,7 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 when the pool is sound, 1 when it is damaged.
 
     Raises:
-        PoolError: There is no pool at the path.
+        PoolError: There is no pool at the path, or leakage is asked for without labels.
     """
     config = tyro.cli(InspectConfig, prog="teasim inspect", args=argv)
     from teasim.errors import PoolError
@@ -45,7 +47,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     for problem in problems:
         print(problem)
     print(f"Integrity: {_verdict(len(problems))}")
+    if config.leakage and not problems:
+        print(_leakage(Pool.open(config.pool)))
     return 1 if problems else 0
+
+
+def _leakage(pool: Pool) -> str:
+    """The clues in words."""
+    from teasim.pool.leakage import leakage
+
+    lines = [
+        "Leakage (AUROC of one clue alone, incorrect against correct; 0.5 gives nothing away):"
+    ]
+    return "\n".join(
+        [*lines, *(f"  {name:20}{value:.2f}" for name, value in leakage(pool).items())]
+    )
 
 
 def _description(pool: Pool) -> str:

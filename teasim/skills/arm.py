@@ -31,6 +31,8 @@ APPROACH = 0.07
 """Length of the straight way in to a grasp and out again [m]."""
 SPEED_MARGIN = 0.85
 """Share of the joints' largest speeds that a plan may use."""
+SECOND_THOUGHTS = 0.8
+"""Somebody who gives up stands still for this long before turning back [s]."""
 _REPLANS = 10
 _REHEARSAL_SAMPLES = 12
 _LARGEST_TURN = 0.30  # more than this between two samples is a jump to another elbow position [rad]
@@ -187,6 +189,12 @@ class Arm:
         """Open by `opening` [m] and retreat along the tool's axis."""
         yield from self.hand(opening)
         yield from self.line(shifted(self.tcp, -back * rotation(self.tcp)[:, 2]), 0.2)
+
+    def turn_back(self, start: SE3, goal: SE3) -> Motion:
+        """Set out from `start` to `goal` with what is held, think again half-way, and return."""
+        yield from self.line(between(start, goal, 0.5))
+        yield from self.wait(SECOND_THOUGHTS)
+        yield from self.line(start)
 
     def choose_posture(self, curves: Sequence[Curve]) -> None:
         """Stay near the first of the arm's postures in which all `curves` can be followed.

@@ -9,6 +9,7 @@ from teasim.skills.knob import turn_off_oven, turn_on_oven
 from teasim.skills.pour import add_milk, add_sugar, add_water
 from teasim.skills.stir import stir
 from teasim.skills.tea_bag import add_tea_bag
+from teasim.task.mistakes import WELL, Manner
 from teasim.task.recipes import check_subtask
 from teasim.world.simulation import Simulation
 
@@ -19,8 +20,8 @@ class Skill:
 
     arm: str
     """The arm that can reach what is needed."""
-    motion: Callable[[Arm], Motion]
-    """Generator of targets, from READY back to READY."""
+    motion: Callable[[Arm, Manner], Motion]
+    """Generator of targets, from READY back to READY, done well or in a mistaken manner."""
     postures: tuple[tuple[float, ...], ...] = ()
     """Joint angles YuMi's arm may stay near [rad], kinematic order, best first; default READY."""
 
@@ -51,7 +52,7 @@ SKILLS: Mapping[str, Skill] = MappingProxyType(
 )
 
 
-def perform(subtask: str, simulation: Simulation, style: Style) -> Motion:
+def perform(subtask: str, simulation: Simulation, style: Style, manner: Manner = WELL) -> Motion:
     """Targets that carry out `subtask`; feed each to `simulation.step` before the next.
 
     Raises:
@@ -63,4 +64,4 @@ def perform(subtask: str, simulation: Simulation, style: Style) -> Motion:
     side = style.hand if style.hand and subtask in body.either_hand else skill.arm
     arm = Arm(side, simulation, style, skill.postures if body.name == "yumi" else ())
     yield from arm.wait(style.pause)
-    yield from skill.motion(arm)
+    yield from skill.motion(arm, manner)

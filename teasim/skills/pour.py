@@ -16,6 +16,7 @@ from teasim.constants import CONTROL_TIMESTEP
 from teasim.errors import SkillError
 from teasim.skills.arm import Arm, Curve, Motion
 from teasim.skills.geometry import DOWN, UP, about, between, pose, rotation, shifted, tool
+from teasim.task.mistakes import ABANDONED, INEFFECTIVE, Manner
 from teasim.world.liquids import RIM_HEIGHT
 from teasim.world.simulation import Simulation
 from teasim.world.station import NOMINAL, body_name
@@ -37,6 +38,21 @@ LONGEST_HOLD = 4.0
 
 
 @dataclass(frozen=True)
+class Aim:
+    """Where a vessel is poured and how far it is tilted."""
+
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """From the cup's axis to where the stream goes down [m]."""
+    share: float = 1.0
+    """Share of the full tilt that is reached."""
+    hold: float = 0.0
+    """Shortest time the vessel is held tilted [s]."""
+
+
+WELL_AIMED = Aim()
+
+
+@dataclass(frozen=True)
 class Grip:
     """How a vessel is grasped and where its spout is."""
 
@@ -50,15 +66,21 @@ class Grip:
     """Tip of the spout in the vessel's frame [m]."""
     closing: float = 1.0
     """1 when the hand's closing axis points to the spout, -1 when it points to the handle."""
+    poorly: Aim = Aim(offset=(-0.085, 0.0, 0.0))
+    """How an ineffective pour is aimed."""
 
 
 KETTLE = Grip("kettle", 0.030, 0.042, (0.062, 0.0, 0.072), -1.0)
-MILK_JUG = Grip("milk_jug", 0.022, 0.026, (0.036, 0.0, 0.062))
+# At a quarter of the tilt the milk still stands below the jug's lip.
+MILK_JUG = Grip("milk_jug", 0.022, 0.026, (0.036, 0.0, 0.062), poorly=Aim(share=0.25, hold=2.0))
 SUGAR_POT = Grip("sugar_pot", 0.022, 0.026, (0.034, 0.0, 0.052))
 
 
-def pour(arm: Arm, grip: Grip) -> Motion:
+def pour(arm: Arm, grip: Grip, manner: Manner) -> Motion:
     """Pour the vessel into the cup until it is empty and put it back where it stood.
+
+    Told to be ineffective, it misses the cup or tilts the vessel too little; told to abandon it,
+    it puts the vessel back half-way.
 
     Raises:
         SkillError: the vessel does not stand upright.
@@ -67,49 +89,60 @@ def pour(arm: Arm, grip: Grip) -> Motion:
     home = _vessel_pose(simulation, grip)
     if rotation(home)[2, 2] < np.cos(np.radians(15)):
         raise SkillError(f"The {grip.vessel} does not stand upright; reset the station.")
+    aim = grip.poorly if manner == INEFFECTIVE else WELL_AIMED
     grasp = _grasp(simulation, grip, home)
-    arm.choose_posture(rehearsal(arm, grip, home, grasp))
+    arm.choose_posture(rehearsal(arm, grip, home, grasp, aim))
     # From above: the straight way in joint space would sweep the hand through the vessel.
     yield from arm.reach(shifted(arm.before(grasp), DESCENT * UP), grip.opening)
     yield from arm.line(arm.before(grasp))
     yield from arm.enter(grasp)
     yield from arm.line(shifted(arm.tcp, arm.style.lift * UP), arm.APPROACH_SPEED * 1.5)
     held = _vessel_pose(simulation, grip).inverse() @ arm.tcp  # the hand in the vessel's frame
-    tilted = _over_cup(simulation, grip, held)
+    tilted = _over_cup(simulation, grip, held, aim)
     above = home @ held
-    yield from arm.line(tilted(0.0))
-    seconds = FULL_TILT / arm.TURN_SPEED * 1.6
-    yield from arm.path(tilted, seconds)
-    yield from _until_empty(arm, grip)
-    yield from arm.path(lambda share: tilted(1 - share), seconds)
-    yield from arm.line(shifted(above, arm.style.lift * UP))
+    lifted = shifted(above, arm.style.lift * UP)
+    if manner == ABANDONED:
+        yield from arm.turn_back(lifted, tilted(0.0))
+    else:
+        yield from _tip(arm, grip, tilted, aim)
+        yield from arm.line(lifted)
     yield from arm.line(shifted(above, 0.001 * UP), arm.APPROACH_SPEED * 1.5)
     yield from arm.release(grip.opening)
     yield from arm.park()
 
 
-def rehearsal(arm: Arm, grip: Grip, home: SE3, grasp: SE3) -> list[Curve]:
+def _tip(arm: Arm, grip: Grip, tilted: Curve, aim: Aim) -> Motion:
+    """Go to the cup, tilt, wait until nothing flows any more, and turn upright again."""
+    yield from arm.line(tilted(0.0))
+    seconds = FULL_TILT / arm.TURN_SPEED * 1.6
+    yield from arm.path(tilted, seconds)
+    yield from arm.wait(aim.hold)
+    yield from _until_empty(arm, grip, aim)
+    yield from arm.path(lambda share: tilted(1 - share), seconds)
+
+
+def rehearsal(arm: Arm, grip: Grip, home: SE3, grasp: SE3, aim: Aim) -> list[Curve]:
     """The way of the hand from the approach to the full tilt, as it should go."""
     before = arm.before(grasp)
     lifted = shifted(grasp, arm.style.lift * UP)
-    tilted = _over_cup(arm.simulation, grip, home.inverse() @ grasp)
+    tilted = _over_cup(arm.simulation, grip, home.inverse() @ grasp, aim)
     stops = [shifted(before, DESCENT * UP), before, grasp, lifted, tilted(0.0)]
     return [*(partial(between, *pair) for pair in pairwise(stops)), tilted]
 
 
-def add_water(arm: Arm) -> Motion:
+def add_water(arm: Arm, manner: Manner) -> Motion:
     """Pour the kettle into the cup."""
-    yield from pour(arm, KETTLE)
+    yield from pour(arm, KETTLE, manner)
 
 
-def add_milk(arm: Arm) -> Motion:
+def add_milk(arm: Arm, manner: Manner) -> Motion:
     """Pour the milk jug into the cup."""
-    yield from pour(arm, MILK_JUG)
+    yield from pour(arm, MILK_JUG, manner)
 
 
-def add_sugar(arm: Arm) -> Motion:
+def add_sugar(arm: Arm, manner: Manner) -> Motion:
     """Tip the sugar pot over the cup."""
-    yield from pour(arm, SUGAR_POT)
+    yield from pour(arm, SUGAR_POT, manner)
 
 
 def _vessel_pose(simulation: Simulation, grip: Grip) -> SE3:
@@ -125,16 +158,16 @@ def _grasp(simulation: Simulation, grip: Grip, home: SE3) -> SE3:
     return pose(handle, tool(np.cos(PITCH) * away + np.sin(PITCH) * DOWN, grip.closing * spout))
 
 
-def _over_cup(simulation: Simulation, grip: Grip, held: SE3) -> Curve:
-    """Pose of the hand for a share of the full tilt, the spout kept over the cup."""
-    cup = simulation.data.body(body_name("cup")).xpos.copy()
+def _over_cup(simulation: Simulation, grip: Grip, held: SE3, aim: Aim) -> Curve:
+    """Pose of the hand for a share of the way to the aim's tilt, the spout kept over the cup."""
+    cup = simulation.data.body(body_name("cup")).xpos + np.array(aim.offset)
     yaw = NOMINAL[grip.vessel].yaw
     towards = np.array([np.cos(yaw), np.sin(yaw), 0.0])
     upright = about(UP, yaw)
     spout = np.array(grip.spout)
 
     def hand(share: float) -> SE3:
-        tilt = FULL_TILT * share
+        tilt = FULL_TILT * aim.share * share
         turned = about(np.cross(UP, towards), tilt) @ upright
         fade = max(1 - tilt / np.radians(40), 0.0)
         tip = cup - spout_offset(grip, tilt) * towards
@@ -154,9 +187,11 @@ def spout_offset(grip: Grip, tilt: float) -> float:
     return float(max(reach, 0.0))
 
 
-def _until_empty(arm: Arm, grip: Grip) -> Motion:
+def _until_empty(arm: Arm, grip: Grip, aim: Aim) -> Motion:
     """Hold until nothing flows any more: by the level, not by the clock."""
     liquids = arm.simulation.liquids
+    if aim.share < 1:
+        return  # it never will be
     for _ in range(round(LONGEST_HOLD / CONTROL_TIMESTEP)):
         yield from arm.wait(CONTROL_TIMESTEP)
         if liquids.amounts[grip.vessel] < 0.5:

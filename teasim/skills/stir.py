@@ -6,6 +6,7 @@ from mink import SE3
 from teasim.errors import SkillError
 from teasim.skills.arm import Arm, Motion
 from teasim.skills.geometry import UP, pose, rotation, shifted, tool
+from teasim.task.mistakes import ABANDONED, INEFFECTIVE, Manner
 from teasim.world.simulation import Simulation
 from teasim.world.station import body_name
 
@@ -13,6 +14,8 @@ OPENING = 0.024
 """Opening of the gripper around the handle [m]."""
 TIP_HEIGHT = 0.016
 """Height of the spoon's tip above the cup's underside while stirring [m]."""
+ABOVE = 0.058
+"""The same when the spoon never gets wet [m]: a full cup holds liquid up to 0.044."""
 CLEAR_HEIGHT = 0.10
 """Height of the spoon's tip on its way [m]: above the rim and above the holder."""
 RADIUS = 0.015
@@ -21,8 +24,8 @@ TURNS_PER_SECOND = 1.0
 """Stirring speed; the tempo of a style does not change it."""
 
 
-def stir(arm: Arm) -> Motion:
-    """Stir the cup and put the spoon back.
+def stir(arm: Arm, manner: Manner) -> Motion:
+    """Stir the cup and put the spoon back; above the liquid, or not at all, if told so.
 
     Raises:
         SkillError: the spoon does not stand in its holder.
@@ -35,28 +38,36 @@ def stir(arm: Arm) -> Motion:
     held = leaning.inverse() @ arm.tcp  # the hand in the spoon's frame
     standing = _standing(simulation)
     cup = pose(simulation.data.body(body_name("cup")).xpos.copy(), rotation(standing))
-
-    def hand(over: SE3, offset: np.ndarray) -> SE3:
-        return shifted(over, offset) @ held
-
+    up = shifted(standing, CLEAR_HEIGHT * UP) @ held
     # Upright before it is drawn: leaning, the bowl would catch on the holder's wall.
-    yield from arm.line(hand(standing, 0.002 * UP), arm.APPROACH_SPEED)
-    yield from arm.line(hand(standing, CLEAR_HEIGHT * UP))
-    yield from arm.line(hand(cup, CLEAR_HEIGHT * UP))
-    start = _beside_bag(simulation)
-    yield from arm.line(hand(cup, _circle(start) + (CLEAR_HEIGHT - TIP_HEIGHT) * UP))
-    yield from arm.line(hand(cup, _circle(start)), 0.25)
-    turns = arm.style.stir_turns
-    seconds = turns / TURNS_PER_SECOND * arm.style.tempo
-    yield from arm.path(
-        lambda share: hand(cup, _circle(start + 2 * np.pi * turns * share)), seconds, eased=False
-    )
-    yield from arm.line(hand(cup, TIP_HEIGHT * UP))
-    yield from arm.line(hand(cup, CLEAR_HEIGHT * UP), 0.25)
-    yield from arm.line(hand(standing, CLEAR_HEIGHT * UP))
-    yield from arm.line(hand(standing, 0.002 * UP), arm.APPROACH_SPEED * 1.5)
+    yield from arm.line(shifted(standing, 0.002 * UP) @ held, arm.APPROACH_SPEED)
+    yield from arm.line(up)
+    if manner == ABANDONED:
+        yield from arm.turn_back(up, shifted(cup, CLEAR_HEIGHT * UP) @ held)
+    else:
+        yield from _round(arm, cup, held, ABOVE if manner == INEFFECTIVE else TIP_HEIGHT)
+        yield from arm.line(up)
+    yield from arm.line(shifted(standing, 0.002 * UP) @ held, arm.APPROACH_SPEED * 1.5)
     yield from arm.release(OPENING)
     yield from arm.park()
+
+
+def _round(arm: Arm, cup: SE3, held: SE3, height: float) -> Motion:
+    """Go to the cup, in, round and round with the spoon's tip at `height` [m], and out again."""
+    start = _beside_bag(arm.simulation)
+    turns = 2 * np.pi * arm.style.stir_turns
+
+    def hand(angle: float, level: float = height) -> SE3:
+        circle = np.array([RADIUS * np.cos(angle), RADIUS * np.sin(angle), level])
+        return shifted(cup, circle) @ held
+
+    yield from arm.line(shifted(cup, CLEAR_HEIGHT * UP) @ held)
+    yield from arm.line(hand(start, CLEAR_HEIGHT))
+    yield from arm.line(hand(start), 0.25)
+    seconds = arm.style.stir_turns / TURNS_PER_SECOND * arm.style.tempo
+    yield from arm.path(lambda share: hand(start + turns * share), seconds, eased=False)
+    yield from arm.line(shifted(cup, height * UP) @ held)
+    yield from arm.line(shifted(cup, CLEAR_HEIGHT * UP) @ held, 0.25)
 
 
 def _beside_bag(simulation: Simulation) -> float:
@@ -66,10 +77,6 @@ def _beside_bag(simulation: Simulation) -> float:
     flat = simulation.data.body(body_name("tea_bag")).xmat.reshape(3, 3)[:2, 1]
     away = -leaning if np.linalg.norm(leaning) > RADIUS / 2 else flat
     return float(np.arctan2(away[1], away[0]))
-
-
-def _circle(angle: float) -> np.ndarray:
-    return np.array([RADIUS * np.cos(angle), RADIUS * np.sin(angle), TIP_HEIGHT])
 
 
 def _standing(simulation: Simulation) -> SE3:

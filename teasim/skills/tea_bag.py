@@ -5,6 +5,7 @@ import numpy as np
 from teasim.errors import SkillError
 from teasim.skills.arm import Arm, Motion
 from teasim.skills.geometry import DOWN, UP, pose, position, rotation, shifted, tool
+from teasim.task.mistakes import ABANDONED, INEFFECTIVE, Manner
 from teasim.world.station import body_name
 
 OPENING = 0.024
@@ -13,10 +14,12 @@ CARRY_HEIGHT = 0.21
 """Height of the hand on its way to the cup [m]: the bag passes above the spoon."""
 DROP_HEIGHT = 0.095
 """Height of the hand when it lets go over the cup's underside [m]."""
+BESIDE = np.array([0.10, 0.03, 0.0])
+"""Where a bag that misses the cup goes, seen from the cup [m]: out of everybody's way."""
 
 
-def add_tea_bag(arm: Arm) -> Motion:
-    """Put the tea bag into the cup.
+def add_tea_bag(arm: Arm, manner: Manner) -> Motion:
+    """Put the tea bag into the cup; beside it, or back into its holder, if told so.
 
     Raises:
         SkillError: the bag is in the cup already, or lies where the gripper cannot take its tag.
@@ -29,10 +32,23 @@ def add_tea_bag(arm: Arm) -> Motion:
         raise SkillError("The tea bag does not stand in its holder; reset the station.")
     tag = simulation.data.site("tea_bag/grasp").xpos.copy()
     yield from arm.take(arm.easier(pose(tag, tool(DOWN, bag[:, 1]))), OPENING)
-    up = arm.tcp
-    yield from arm.line(shifted(up, (CARRY_HEIGHT - position(up)[2]) * UP))
+    home = arm.tcp
+    up = shifted(home, (CARRY_HEIGHT - position(home)[2]) * UP)
+    yield from arm.line(up)
     cup = simulation.data.body(body_name("cup")).xpos.copy()
-    yield from arm.line(pose(cup + CARRY_HEIGHT * UP, rotation(up)))
-    yield from arm.line(pose(cup + DROP_HEIGHT * UP, rotation(up)), 0.25)
-    yield from arm.release(OPENING, back=CARRY_HEIGHT - DROP_HEIGHT)
+    if manner == ABANDONED:
+        over = pose(cup + CARRY_HEIGHT * UP, rotation(up))
+        yield from arm.turn_back(up, over)
+        yield from arm.line(shifted(home, 0.001 * UP), arm.APPROACH_SPEED * 1.5)
+        yield from arm.release(OPENING, back=CARRY_HEIGHT - position(home)[2])
+    else:
+        yield from _drop(arm, cup + (BESIDE if manner == INEFFECTIVE else 0.0))
     yield from arm.park()
+
+
+def _drop(arm: Arm, place: np.ndarray) -> Motion:
+    """Carry the bag over `place` (3,) [m], lower it and let it fall."""
+    hand = rotation(arm.tcp)
+    yield from arm.line(pose(place + CARRY_HEIGHT * UP, hand))
+    yield from arm.line(pose(place + DROP_HEIGHT * UP, hand), 0.25)
+    yield from arm.release(OPENING, back=CARRY_HEIGHT - DROP_HEIGHT)

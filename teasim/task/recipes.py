@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from types import MappingProxyType
 
+import numpy as np
+
 from teasim.constants import SUBTASKS
 from teasim.errors import ConfigError
 
@@ -31,6 +33,9 @@ SEQ_2 = (
 CRITICAL = ("add_tea_bag", "add_water", "turn_off_oven")
 """Seq_3 leaves out one or two of these."""
 
+POURED = ("add_water", "add_sugar", "add_milk")
+"""Sub-tasks that empty a vessel into the cup."""
+
 PRECEDENCE = MappingProxyType(
     {
         "turn_on_oven": (),
@@ -44,8 +49,9 @@ PRECEDENCE = MappingProxyType(
 )
 """What must have happened before each sub-task in a correct demonstration."""
 
-OPTIMAL, SUBOPTIMAL, INCORRECT = "seq_1", "seq_2", "seq_3"
-SEQUENCES = (OPTIMAL, SUBOPTIMAL, INCORRECT)
+OPTIMAL, SUBOPTIMAL, INCORRECT, LEGAL = "seq_1", "seq_2", "seq_3", "legal"
+SEQUENCES = (OPTIMAL, SUBOPTIMAL, INCORRECT, LEGAL)
+"""What a demonstration is labelled as; `legal` is a random order that respects the precedence."""
 
 
 def check_subtask(name: str) -> str:
@@ -67,16 +73,35 @@ def is_legal(order: Sequence[str]) -> bool:
 
 
 def recognisable(steps: Sequence[str]) -> tuple[str, ...]:
-    """What physics will recognise of `steps` when every one is carried out.
+    """What physics will recognise of `steps` when every one is carried out well.
 
-    Turning off an oven that is off, or stirring an empty cup, is motion without an event.
+    Turning the knob to where it is, pouring from an empty vessel and stirring an empty cup are
+    motion without an event.
     """
-    return tuple(
-        name
-        for k, name in enumerate(steps)
-        if not (name == "turn_off_oven" and "turn_on_oven" not in steps[:k])
-        and not (name == "stir" and not {"add_water", "add_milk"} & set(steps[:k]))
+    happened: list[str] = []
+    for name in steps:
+        if not _without_effect(name, happened):
+            happened.append(name)
+    return tuple(happened)
+
+
+def _without_effect(name: str, happened: Sequence[str]) -> bool:
+    on = happened.count("turn_on_oven") > happened.count("turn_off_oven")
+    wet = "add_water" in happened or "add_milk" in happened
+    return (
+        (name == "turn_on_oven" and on)
+        or (name == "turn_off_oven" and not on)
+        or (name in POURED and name in happened)
+        or (name == "stir" and not wet)
     )
+
+
+def random_order(rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw one of the legal orders, every one equally likely."""
+    while True:
+        order = tuple(SUBTASKS[k] for k in rng.permutation(len(SUBTASKS)))
+        if is_legal(order):
+            return order
 
 
 def next_correct(done: Sequence[str]) -> str | None:

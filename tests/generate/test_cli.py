@@ -8,6 +8,8 @@ import pytest
 
 import teasim.generate
 from teasim.cli.main import main
+from teasim.generate import recording
+from teasim.task.mistakes import MISTAKES
 from tests.generate.test_pool import SHORT, digests
 
 ROOT = Path(__file__).parents[2]
@@ -16,10 +18,13 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--mistakes", "sneeze"], "Unknown mistake 'sneeze'; choose skip."),
+        (
+            ["--mistakes", "sneeze"],
+            f"Unknown mistake 'sneeze'; choose {', '.join(MISTAKES)}.",
+        ),
         (
             ["--mistakes", "skip:many"],
-            "'skip:many' is no mistake with a count; write NAME[@SUBTASK][:COUNT].",
+            "'skip:many' is no mistake with a count; write NAME[@SUBTASK][+NAME...][:COUNT].",
         ),
         (["--cameras", "back"], "Unknown camera 'back'; choose left, cup, front, top."),
         (["--size", "63"], "The size is 63; choose an even number from 32 to 1024."),
@@ -60,7 +65,7 @@ def test_a_file_in_the_way_is_left_alone(tmp_path, capsys):
 
 
 def test_an_unfinished_pool_of_other_settings_is_left_alone(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(teasim.generate, "_record", lambda *_: "It was spilled.")
+    monkeypatch.setattr(recording, "_record", lambda *_: "It was spilled.")
     assert main(["generate", str(tmp_path / "pool"), "--seq1", "1", "--size", "64"]) == 2
     assert "failed 6 times; the last time: It was spilled." in capsys.readouterr().err
     before = digests(tmp_path)

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from teasim.cli.generate import parse_mistakes
 from teasim.constants import FPS, STATE_NAMES, SUBTASKS
 from teasim.errors import ConfigError
-from teasim.generate import DemoPlan, GenerateConfig, mismatch, plan_pool, pool_header
+from teasim.generate import DemoPlan, GenerateConfig, plan_pool
+from teasim.generate.recording import mismatch, pool_header
 from teasim.task.mistakes import MISTAKES, Plan, PlannedMistake
 from teasim.task.recipes import CRITICAL, SEQ_1, SEQ_2, is_legal
 from teasim.world.events import Event
@@ -23,7 +24,7 @@ MIXED = GenerateConfig(seq1=10, seq2=5, seq3=7, mistakes=(("skip", 3),))
 def test_a_pool_holds_what_was_asked_for(seq1, seq2, seq3, skips, seed):
     if seq1 + seq2 + seq3 + skips == 0:
         return
-    plans = plan_pool(GenerateConfig(seq1, seq2, seq3, (("skip", skips),), seed=seed))
+    plans = plan_pool(GenerateConfig(seq1, seq2, seq3, mistakes=(("skip", skips),), seed=seed))
     assert [plan.index for plan in plans] == list(range(len(plans)))
     kinds = Counter(plan.sequence for plan in plans)
     assert (kinds["seq_1"], kinds["seq_2"], kinds["seq_3"]) == (seq1, seq2, seq3 + skips)
@@ -49,7 +50,33 @@ def check(plan: DemoPlan) -> None:
 
 def test_a_seed_gives_one_plan():
     assert plan_pool(MIXED) == plan_pool(MIXED)
-    assert plan_pool(MIXED) != plan_pool(GenerateConfig(10, 5, 7, (("skip", 3),), seed=1))
+    assert plan_pool(MIXED) != plan_pool(GenerateConfig(10, 5, 7, mistakes=(("skip", 3),), seed=1))
+
+
+def test_random_orders_are_legal_and_correct():
+    plans = plan_pool(GenerateConfig(seq1=0, legal=30))
+    assert {demo.sequence for demo in plans} == {"legal"}
+    assert all(is_legal(demo.plan.steps) and not demo.plan.mistakes for demo in plans)
+    assert len({demo.plan.steps for demo in plans}) > 10
+
+
+def test_optional_ingredients_are_left_out_by_half_and_that_is_no_mistake():
+    config = GenerateConfig(seq1=40, seq3=20, optional=("add_sugar",))
+    plans = plan_pool(config)
+    without = [demo for demo in plans if "add_sugar" not in demo.plan.steps]
+    assert 15 < len(without) < 45
+    for demo in plans:
+        assert "add_milk" in demo.plan.steps
+        assert "add_sugar" not in {label.subtask for label in demo.plan.mistakes}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_every_mistake_can_be_asked_for(name):
+    plans = plan_pool(GenerateConfig(seq1=0, mistakes=((name, 2), (f"{name}@add_milk", 1))))
+    labels = [label for demo in plans for label in demo.plan.mistakes]
+    assert [label.name for label in labels] == [name] * 3
+    assert "add_milk" in {label.subtask for label in labels}
+    assert {demo.sequence for demo in plans} == {"seq_3"}
 
 
 def test_sequences_are_mixed_in_the_pool():
@@ -85,6 +112,11 @@ def test_the_header_tells_how_the_pool_was_made():
         ({"size": 16}, "The size is 16; choose an even number from 32 to 1024."),
         ({"size": 2048}, "The size is 2048; choose an even number from 32 to 1024."),
         ({"quality": "great"}, "Unknown quality 'great'; choose fast, nice."),
+        ({"legal": -1}, "--legal is -1; give 0 or more demonstrations."),
+        (
+            {"optional": ("add_water",)},
+            "'add_water' is no optional ingredient; choose add_sugar, add_milk.",
+        ),
         ({"seed": -1}, "The seed is -1; choose 0 or more."),
     ],
 )
@@ -102,9 +134,18 @@ def test_mistakes_are_read_as_names_with_counts():
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("skip:two",), "'skip:two' is no mistake with a count; write NAME[@SUBTASK][:COUNT]."),
-        (("skip:-1",), "'skip:-1' is no mistake with a count; write NAME[@SUBTASK][:COUNT]."),
-        (("skip:²",), "'skip:²' is no mistake with a count; write NAME[@SUBTASK][:COUNT]."),
+        (
+            ("skip:two",),
+            "'skip:two' is no mistake with a count; write NAME[@SUBTASK][+NAME...][:COUNT].",
+        ),
+        (
+            ("skip:-1",),
+            "'skip:-1' is no mistake with a count; write NAME[@SUBTASK][+NAME...][:COUNT].",
+        ),
+        (
+            ("skip:²",),
+            "'skip:²' is no mistake with a count; write NAME[@SUBTASK][+NAME...][:COUNT].",
+        ),
         (("skip", "skip:2"), "The mistake 'skip' is given twice; write it once as NAME:COUNT."),
     ],
 )
@@ -118,6 +159,8 @@ WITHOUT_OFF = Plan(
     tuple(step for step in SEQ_1 if step != "turn_off_oven"),
     (PlannedMistake("skip", "turn_off_oven", 4),),
 )
+BESIDE = Plan(SEQ_1, (PlannedMistake("ineffective", "add_sugar", 2),))
+WITHOUT_SUGAR = tuple(step for step in SEQ_1 if step != "add_sugar")
 
 
 @pytest.mark.parametrize(
@@ -148,11 +191,25 @@ WITHOUT_OFF = Plan(
         ),
         (Plan(SEQ_1), SEQ_1, False, 9.0, "Something went beside the cup (spilled_milk)."),
         (
+            BESIDE,
+            WITHOUT_SUGAR,
+            False,
+            0.0,
+            "Something was to go beside the cup and did not (spilled_sugar).",
+        ),
+        (
+            BESIDE,
+            SEQ_1,
+            False,
+            9.0,
+            "Physics saw another order than planned (missing: none; extra: add_sugar).",
+        ),
+        (
             Plan(SEQ_1),
             SEQ_1,
             True,
             0.0,
-            "The goal was reached in spite of the mistake, or missed without one.",
+            "The oven is not as the knob was turned.",
         ),
     ],
 )

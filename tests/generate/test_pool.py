@@ -10,14 +10,8 @@ import pytest
 import teasim.generate
 from teasim.constants import SUBTASKS
 from teasim.errors import GenerationError, PoolError, SkillError
-from teasim.generate import (
-    ATTEMPTS,
-    DemoPlan,
-    GenerateConfig,
-    generate,
-    generate_demo,
-    plan_pool,
-)
+from teasim.generate import DemoPlan, GenerateConfig, generate, plan_pool, recording
+from teasim.generate.recording import ATTEMPTS, generate_demo
 from teasim.pool import Pool
 from teasim.pool.integrity import check_pool
 from teasim.task.mistakes import Plan, PlannedMistake
@@ -74,7 +68,7 @@ def test_a_finished_pool_is_not_touched_again(tmp_path, short, monkeypatch):
 
 def test_what_comes_out_wrong_is_made_again_with_other_randomness(tmp_path, monkeypatch):
     monkeypatch.setattr(teasim.generate, "plan_pool", lambda _: SHORT[:1])
-    record, draws = teasim.generate._record, []
+    record, draws = recording._record, []
 
     def clumsy(writer, config, demo, rng):
         draws.append(rng.bit_generator.state["state"]["state"])
@@ -82,14 +76,14 @@ def test_what_comes_out_wrong_is_made_again_with_other_randomness(tmp_path, monk
             raise SkillError("The cup fell.")
         return "It was spilled." if len(draws) == 2 else record(writer, config, demo, rng)
 
-    monkeypatch.setattr(teasim.generate, "_record", clumsy)
+    monkeypatch.setattr(recording, "_record", clumsy)
     made = generate(tmp_path / "pool", SMALL)
     assert (made.remade, len(set(draws))) == (2, 3)
     assert len(made.pool.episodes) == 1
 
 
 def test_what_never_comes_out_right_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(teasim.generate, "_record", lambda *_: "It was spilled.")
+    monkeypatch.setattr(recording, "_record", lambda *_: "It was spilled.")
     with pytest.raises(GenerationError) as error:
         generate_demo(tmp_path / "pool", SMALL, SHORT[0])
     assert str(error.value) == (

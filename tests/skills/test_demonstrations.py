@@ -7,6 +7,7 @@ import pytest
 
 from teasim.rollout import demonstrate, run_subtask
 from teasim.skills.arm import Style
+from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1, SEQ_2
 from teasim.task.scoring import judge
 from teasim.world.monitor import PENETRATION_LIMIT, TCP_SPEED_LIMIT, Monitor
@@ -20,7 +21,7 @@ from teasim.world.station import nominal_layout
 def test_a_sequence_makes_tea(plan, seed):
     simulation = Simulation()
     monitor = Monitor(simulation)
-    steps = [s.position for s in demonstrate(simulation, plan, np.random.default_rng(seed))]
+    steps = [s.position for s in demonstrate(simulation, Plan(plan), np.random.default_rng(seed))]
     assert simulation.subtasks_done == plan
     assert [position for position, _ in groupby(steps)] == list(range(len(plan)))
     verdict = judge(plan, oven_on=simulation.oven_on, spilled=simulation.liquids.spilled)
@@ -35,7 +36,7 @@ def test_a_sequence_makes_tea(plan, seed):
 def played(seed: int) -> np.ndarray:
     simulation = Simulation()
     rng = np.random.default_rng(seed)
-    return np.array([step.target for step in demonstrate(simulation, ("turn_on_oven",), rng)])
+    return np.array([step.target for step in demonstrate(simulation, Plan(("turn_on_oven",)), rng)])
 
 
 def test_a_seed_gives_one_demonstration():
@@ -45,7 +46,7 @@ def test_a_seed_gives_one_demonstration():
 
 def test_the_simulation_stands_before_the_step_that_is_shown():
     simulation = Simulation()
-    demonstration = demonstrate(simulation, ("turn_on_oven",), np.random.default_rng(0))
+    demonstration = demonstrate(simulation, Plan(("turn_on_oven",)), np.random.default_rng(0))
     for count, step in zip(range(5), demonstration, strict=False):
         assert simulation.data.time == pytest.approx(0.1 * count)
         assert (step.subtask, step.position) == ("turn_on_oven", 0)

@@ -9,6 +9,7 @@ import pytest
 from teasim.errors import ConfigError
 from teasim.rollout import demonstrate
 from teasim.skills.demonstrators import OPERATOR, PARTICIPANTS, sample_style, varied
+from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1, is_legal
 from teasim.world.monitor import PENETRATION_LIMIT, TCP_SPEED_LIMIT, Monitor
 from teasim.world.simulation import Simulation
@@ -68,7 +69,7 @@ def test_impossible_participants_are_refused(change, sentence):
 def test_a_person_does_not_demonstrate_with_a_robot():
     rng = np.random.default_rng(0)
     with pytest.raises(ConfigError) as error:
-        next(demonstrate(Simulation(), SEQ_1, rng, PARTICIPANTS["person_1"]))
+        next(demonstrate(Simulation(), Plan(SEQ_1), rng, participant=PARTICIPANTS["person_1"]))
     assert str(error.value) == (
         "person_1 works with the embodiment 'person', the station has 'yumi'; choose one for both."
     )
@@ -81,7 +82,8 @@ def test_people_make_tea_in_the_orders_they_like(name):
     for seed, order in enumerate(who.orders):
         simulation.observers.clear()
         monitor = Monitor(simulation)
-        for _ in demonstrate(simulation, order, np.random.default_rng(seed), who):
+        rng = np.random.default_rng(seed)
+        for _ in demonstrate(simulation, Plan(order), rng, participant=who):
             pass
         assert simulation.subtasks_done == order
         assert sum(simulation.liquids.spilled.values()) == 0

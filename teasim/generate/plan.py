@@ -1,0 +1,47 @@
+"""Who does what: every demonstration of a pool before it is carried out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teasim.generate.config import GenerateConfig
+from teasim.task.mistakes import Plan, spoil
+from teasim.task.recipes import INCORRECT, LEGAL, OPTIMAL, SEQ_1, SEQ_2, SUBOPTIMAL, random_order
+
+
+@dataclass(frozen=True)
+class DemoPlan:
+    """One demonstration before it is carried out."""
+
+    index: int
+    """Its number in the pool."""
+    sequence: str
+    """seq_1, seq_2, seq_3 or legal."""
+    plan: Plan
+    """Steps and mistakes."""
+
+
+def plan_pool(config: GenerateConfig) -> tuple[DemoPlan, ...]:
+    """Plan every demonstration; which comes at which place in the pool is shuffled.
+
+    Raises:
+        ConfigError: a mistake does not fit into a recipe without an optional ingredient.
+    """
+    rng = np.random.default_rng([config.seed, 0])
+    plans = [(OPTIMAL, _recipe(SEQ_1, config, rng)) for _ in range(config.seq1)]
+    plans += [(SUBOPTIMAL, _recipe(SEQ_2, config, rng)) for _ in range(config.seq2)]
+    for k in range(config.seq3):
+        # One omission and two take turns, so that every pool holds both kinds.
+        spec = "+".join(["skip"] * (1 + k % 2))
+        plans.append((INCORRECT, spoil(_recipe(SEQ_1, config, rng), spec, rng)))
+    for spec, count in config.mistakes:
+        plans += [(INCORRECT, spoil(_recipe(SEQ_1, config, rng), spec, rng)) for _ in range(count)]
+    plans += [(LEGAL, _recipe(random_order(rng), config, rng)) for _ in range(config.legal)]
+    order = rng.permutation(len(plans))
+    return tuple(DemoPlan(index, *plans[which]) for index, which in enumerate(order))
+
+
+def _recipe(order: tuple[str, ...], config: GenerateConfig, rng: np.random.Generator) -> Plan:
+    """The order with each optional ingredient left out by the toss of a coin."""
+    left_out = {name for name in config.optional if rng.random() < 0.5}
+    return Plan(tuple(name for name in order if name not in left_out))

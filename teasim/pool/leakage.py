@@ -1,0 +1,86 @@
+"""What gives incorrect demonstrations away without a look at what was done in them.
+
+A filter that only measures length, or the size of a file, is no filter. Every number here is an
+AUROC over the pairs of a correct and an incorrect demonstration: 0.5 says nothing, 1.0 says that
+the incorrect ones always have more of it, 0.0 that they always have less. It reads the labels of
+the pool and is for whoever makes pools, never for a filter.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from teasim.errors import PoolError
+from teasim.pool.lerobot import Episode, Pool
+from teasim.pool.videos import read_frames
+
+MOTION_STEP = 5
+"""Motion is measured between frames this far apart."""
+
+
+def auroc(values: Sequence[float] | np.ndarray, positive: Sequence[bool] | np.ndarray) -> float:
+    """Share of pairs in which a positive has the larger value (n,); ties count half.
+
+    Raises:
+        ValueError: there are no positives or no negatives.
+    """
+    numbers, marks = np.asarray(values, dtype=float), np.asarray(positive, dtype=bool)
+    if marks.all() or not marks.any():
+        raise ValueError("An AUROC needs positives and negatives.")
+    differences = numbers[marks][:, None] - numbers[~marks][None, :]
+    return float((np.sign(differences).mean() + 1) / 2)
+
+
+def leakage(pool: Pool) -> dict[str, float]:
+    """AUROC of every clue in `CLUES` alone, for incorrect against correct demonstrations.
+
+    Raises:
+        PoolError: the pool does not say which demonstrations are correct, or all are the same.
+    """
+    records = [episode.record for episode in pool.episodes]
+    if any(record is None for record in records):
+        raise PoolError(f"The pool '{pool.root}' does not label its demonstrations as correct.")
+    incorrect = [record is not None and not record.correct for record in records]
+    if all(incorrect) or not any(incorrect):
+        kind = "incorrect" if all(incorrect) else "correct"
+        raise PoolError(
+            f"All demonstrations of the pool '{pool.root}' are {kind}; leakage needs both kinds."
+        )
+    return {
+        name: auroc([clue(pool, episode) for episode in pool.episodes], incorrect)
+        for name, clue in CLUES.items()
+    }
+
+
+def _length(_: Pool, episode: Episode) -> float:
+    return float(episode.length)
+
+
+def _segments(_: Pool, episode: Episode) -> float:
+    return float(len(episode.spans()))
+
+
+def _motion(pool: Pool, episode: Episode) -> float:
+    """Mean difference of the first camera's grey values over MOTION_STEP frames."""
+    clip = episode.video(pool.cameras[0])
+    frames = read_frames(clip, np.arange(0, episode.length, MOTION_STEP))
+    grey = frames[:, ::2, ::2].mean(axis=3, dtype=np.float32)
+    return float(np.abs(np.diff(grey, axis=0)).mean()) if len(grey) > 1 else 0.0
+
+
+def _file_size(pool: Pool, episode: Episode) -> float:
+    """Bytes of the files that hold the demonstration's videos."""
+    paths = {episode.video(camera).path for camera in pool.cameras}
+    return float(sum(path.stat().st_size for path in paths))
+
+
+CLUES: Mapping[str, Callable[[Pool, Episode], float]] = MappingProxyType(
+    {
+        "length": _length,
+        "number of segments": _segments,
+        "mean motion": _motion,
+        "file size": _file_size,
+    }
+)
+"""What might give a demonstration away, as a number."""
