@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from teasim.constants import CONTROL_TIMESTEP
-from teasim.errors import SkillError
+from teasim.errors import ConfigError, SkillError
 from teasim.skills.arm import Style
-from teasim.skills.demonstrators import sample_style, varied
+from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform
 from teasim.skills.pace import MATCHED_SECONDS, Pace
 from teasim.task.mistakes import Plan
@@ -28,13 +28,19 @@ class Step:
     position: int
     """Index of that sub-task in the demonstration."""
     target: np.ndarray
-    """Joint angles [rad] and gripper openings [m] to go to (16,), float32 as they are logged."""
+    """Where to go, float32 as it is logged: joint angles [rad] and openings [m] (16,) for YuMi,
+    (14,) for a person."""
 
 
 def demonstrate(
-    simulation: Simulation, plan: Plan, rng: np.random.Generator, *, match_length: bool = False
+    simulation: Simulation,
+    plan: Plan,
+    rng: np.random.Generator,
+    *,
+    match_length: bool = False,
+    participant: Participant = OPERATOR,
 ) -> Iterator[Step]:
-    """Reset the station to a random layout and carry out `plan` step by step.
+    """Reset the station to a random layout and let `participant` carry out `plan` step by step.
 
     With `match_length` it rests in between so that it lasts as long as any other demonstration.
     The simulation stands before each yielded step, so a caller can look at it, and is advanced
@@ -42,21 +48,34 @@ def demonstrate(
     gives the same bits.
 
     Raises:
+        ConfigError: the simulation has not the participant's body.
         SkillError: a sub-task cannot be done from the state the ones before it left.
     """
+    _take_place(simulation, participant)
     simulation.reset(sample_layout(rng))
-    style = sample_style(rng)
+    style = sample_style(rng, participant)
     pace = Pace(plan.steps, rng.uniform(*MATCHED_SECONDS), rng) if match_length else None
     for position, subtask in enumerate(plan.steps):
         elapsed = float(simulation.data.time)
         rest = pace.rest(position, elapsed, style) if pace else 0.0
         yield from _rest(simulation, subtask, position, rest)
-        for target in perform(subtask, simulation, varied(style, rng), plan.manner(position)):
+        now = varied(style, rng, participant)
+        for target in perform(subtask, simulation, now, plan.manner(position)):
             yield from _advance(simulation, subtask, position, target)
     rest = pace.length - float(simulation.data.time) if pace else FINAL_REST
     if rest < FINAL_REST - CONTROL_TIMESTEP:
         raise SkillError(f"The demonstration took {FINAL_REST - rest:.1f} s longer than it may.")
     yield from _rest(simulation, plan.steps[-1], len(plan.steps) - 1, rest)
+
+
+def _take_place(simulation: Simulation, participant: Participant) -> None:
+    if simulation.embodiment.name != participant.embodiment:
+        raise ConfigError(
+            f"{participant.name} works with the embodiment '{participant.embodiment}', "
+            f"the station has '{simulation.embodiment.name}'; choose one for both."
+        )
+    if participant.look is not None:
+        simulation.dress(participant.look)
 
 
 def _rest(simulation: Simulation, subtask: str, position: int, seconds: float) -> Iterator[Step]:

@@ -19,12 +19,10 @@ from teasim.skills.geometry import (
     turn_angle,
 )
 from teasim.skills.ik import kinematics
-from teasim.world.control import FINGER_SPEED
 from teasim.world.simulation import Simulation
-from teasim.world.yumi import JOINT_SPEEDS, READY
 
 Motion = Iterator[np.ndarray]
-"""Targets (16,) of successive control steps."""
+"""Targets of successive control steps: (16,) for YuMi, (2 n + 2,) for n joints per arm."""
 
 Curve = Callable[[float], SE3]
 """Poses of the hand over a share in [0, 1]."""
@@ -49,11 +47,17 @@ class Style:
     lift: float = 0.07
     """Height by which things are lifted before they are carried [m]."""
     bow: float = 0.0
-    """Sideways bow of the free motions between READY and an object [rad of the base joint]."""
+    """Sideways bow of the free motions between READY and an object [rad of the base joint, m]."""
     pause: float = 0.3
     """Rest before each sub-task [s]."""
     stir_turns: float = 3.0
     """Turns of the spoon in the cup."""
+    hand: str | None = None
+    """Preferred hand, for what the embodiment can do with either; None leaves it to the skill."""
+    hesitation: float = 0.0
+    """Stop in front of a thing before the hand goes in to take it [s]."""
+    regrasp: bool = False
+    """Whether a thing is taken, let go, and taken again."""
 
 
 class Arm:
@@ -65,8 +69,6 @@ class Arm:
     """Peak speed of the hand near things [m/s]."""
     TURN_SPEED = 1.2
     """Peak speed of turning and tilting [rad/s]."""
-    REACH_SPEED = 1.2
-    """Peak speed of the fastest joint in free motions [rad/s]."""
 
     def __init__(
         self,
@@ -77,16 +79,17 @@ class Arm:
     ) -> None:
         self.simulation, self.style = simulation, style
         self._side = side
-        self._kinematics = kinematics(side)
-        self._postures = [np.array(posture) for posture in postures] or [READY[side]]
+        self._body = body = simulation.embodiment
+        self._kinematics = kinematics(side, body.name)
+        self._postures = [np.array(posture) for posture in postures] or [body.ready[side]]
         self._prefer(self._postures[0])
-        first = 7 * ARMS.index(side)
-        self._joints = slice(first, first + 7)
-        self._hand = 14 + ARMS.index(side)
+        first = body.width * ARMS.index(side)
+        self._joints = slice(first, first + body.width)
+        self._hand = 2 * body.width + ARMS.index(side)
 
     @property
     def joints(self) -> np.ndarray:
-        """Last target of the arm's joints (7,) [rad]."""
+        """Last target of the arm's joints (n,) [rad or m]."""
         return self.simulation.target[self._joints]
 
     @property
@@ -108,7 +111,7 @@ class Arm:
         target = self.simulation.target.copy()
         target[self._hand] = opening
         settle = 0.15 if opening > before else 0.3
-        for _ in range(_steps(travel / FINGER_SPEED + settle)):
+        for _ in range(_steps(travel / self._body.finger_speed + settle)):
             yield target.copy()
 
     def squeeze(self) -> Motion:
@@ -116,12 +119,12 @@ class Arm:
         before = float(self.simulation.joint_state()[self._hand])
         target = self.simulation.target.copy()
         target[self._hand] = GRIPPER_SQUEEZE
-        for _ in range(_steps(max(before, 0.0) / 2 / FINGER_SPEED + 0.4)):
+        for _ in range(_steps(max(before, 0.0) / 2 / self._body.finger_speed + 0.4)):
             yield target.copy()
 
     def park(self) -> Motion:
         """Go back to READY and close the hand on the way."""
-        for target in self._free(READY[self._side]):
+        for target in self._free(self._body.ready[self._side]):
             target[self._hand] = 0.0
             yield target
 
@@ -168,8 +171,14 @@ class Arm:
 
     def enter(self, grasp: SE3) -> Motion:
         """Go in to a grasp and squeeze."""
+        opening = float(self.simulation.target[self._hand])
+        if self.style.hesitation:
+            yield from self.wait(self.style.hesitation)
         yield from self.line(grasp, self.APPROACH_SPEED)
         yield from self.squeeze()
+        if self.style.regrasp:
+            yield from self.hand(opening)
+            yield from self.squeeze()
 
     def take(self, grasp: SE3, opening: float) -> Motion:
         """Reach for a grasp from where nothing is in the way, go in, and squeeze."""
@@ -241,17 +250,18 @@ class Arm:
         The controller's cubic reaches two thirds through a step what neither of its ends has.
         """
         speeds = np.diff(plan, axis=0, prepend=self.joints[None]) / CONTROL_TIMESTEP
-        before = np.vstack([np.zeros(7), speeds[:-1]])
+        before = np.vstack([np.zeros(self._body.width), speeds[:-1]])
         peaks = np.maximum(np.abs(speeds), np.abs(4 * speeds - before) / 3)
-        return float((peaks / (SPEED_MARGIN * JOINT_SPEEDS)).max())
+        return float((peaks / (SPEED_MARGIN * self._body.speeds)).max())
 
     def _free(self, goal: np.ndarray) -> Motion:
         start = self.joints.copy()
-        span = float(np.abs(goal - start).max())
-        count = _steps(max(span / self.REACH_SPEED * EASE_PEAK / self.style.tempo, 0.5))
+        span = float((np.abs(goal - start) / self._body.reach_speeds).max())  # [s] at the peak
+        count = _steps(max(span * EASE_PEAK / self.style.tempo, 0.5))
         shares = np.linspace(0, 1, count + 1)[1:]
         plan = start + ease(shares)[:, None] * (goal - start)
-        plan[:, 0] += self.style.bow * np.sin(np.pi * shares) ** 2
+        aside = self.style.bow * self._body.bow + self._body.arc
+        plan += np.outer(np.sin(np.pi * shares) ** 2, aside)
         yield from self._play(plan)
 
     def _play(self, plan: np.ndarray) -> Motion:

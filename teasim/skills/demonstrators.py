@@ -1,27 +1,179 @@
 """Who demonstrates: honest variation of tempo and path that is not a mistake."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
+from teasim.constants import ARMS
+from teasim.errors import ConfigError
 from teasim.skills.arm import Style
+from teasim.task.recipes import SEQ_1, is_legal
+from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.person import Look
+
+Range = tuple[float, float]
 
 
-def sample_style(rng: np.random.Generator) -> Style:
-    """Draw the style of one demonstration."""
+@dataclass(frozen=True)
+class Participant:
+    """Somebody who demonstrates, with habits of their own: ranges of styles are drawn from them."""
+
+    name: str
+    """Name in the registry."""
+    embodiment: str
+    """The body the skills are carried out with."""
+    tempo: Range
+    """Speed of all motions relative to the nominal one."""
+    lift: Range
+    """Height by which things are lifted before they are carried [m]."""
+    bow: Range
+    """Sideways bow of the free motions [rad or m]."""
+    pause: Range
+    """Rest before each sub-task [s]."""
+    stir_turns: Range
+    """Turns of the spoon in the cup."""
+    look: Look | None = None
+    """Colours of skin and clothes; None for a body that has neither."""
+    hand: str | None = None
+    """The hand that takes the tea bag and the spoon; None when there is no choice."""
+    hesitates: float = 0.0
+    """How probable it is that the hand stops in front of a thing, per sub-task."""
+    regrasps: float = 0.0
+    """How probable it is that a thing is taken twice, per sub-task."""
+    orders: tuple[tuple[str, ...], ...] = (SEQ_1,)
+    """Correct orders that come naturally, the most usual one first."""
+
+    def __post_init__(self) -> None:
+        """Check the habits.
+
+        Raises:
+            ConfigError: unknown embodiment or hand, or an order that is not correct.
+        """
+        if self.embodiment not in EMBODIMENTS:
+            raise ConfigError(
+                f"{self.name} has the unknown embodiment '{self.embodiment}'; "
+                f"choose {', '.join(EMBODIMENTS)}."
+            )
+        if self.hand not in (None, *ARMS):
+            raise ConfigError(
+                f"{self.name} has the unknown hand '{self.hand}'; choose {', '.join(ARMS)}."
+            )
+        for order in self.orders:
+            if not is_legal(order):
+                raise ConfigError(f"{self.name} has an order that is not correct: {order}.")
+
+
+_HESITATION = (0.4, 1.0)  # [s]
+
+OPERATOR = Participant(
+    "yumi",
+    embodiment="yumi",
+    tempo=(1.5, 1.9),
+    lift=(0.065, 0.085),
+    bow=(-0.06, 0.06),
+    pause=(0.2, 0.6),
+    stir_turns=(2.6, 3.6),
+)
+"""The robot, led by its operator, who is always the same."""
+
+_SUGAR_LAST = (
+    "turn_on_oven",
+    "add_tea_bag",
+    "add_milk",
+    "add_sugar",
+    "turn_off_oven",
+    "add_water",
+    "stir",
+)
+_WATER_EARLY = (
+    "turn_on_oven",
+    "add_tea_bag",
+    "turn_off_oven",
+    "add_water",
+    "add_sugar",
+    "add_milk",
+    "stir",
+)
+_MILK_LAST = (
+    "turn_on_oven",
+    "add_tea_bag",
+    "add_sugar",
+    "turn_off_oven",
+    "add_water",
+    "add_milk",
+    "stir",
+)
+
+_PEOPLE = (
+    Participant(
+        "person_1",
+        embodiment="person",
+        look=Look((0.87, 0.66, 0.54), (0.24, 0.35, 0.56), (0.24, 0.35, 0.56)),
+        tempo=(1.8, 2.1),
+        lift=(0.070, 0.090),
+        bow=(-0.06, 0.06),
+        pause=(0.2, 0.5),
+        stir_turns=(2.6, 3.4),
+        hand="left",
+        hesitates=0.08,
+        regrasps=0.04,
+        orders=(SEQ_1, _SUGAR_LAST),
+    ),
+    Participant(
+        "person_2",
+        embodiment="person",
+        look=Look((0.47, 0.31, 0.22), (0.80, 0.78, 0.72), (0.62, 0.20, 0.22)),
+        tempo=(1.95, 2.3),
+        lift=(0.085, 0.105),
+        bow=(0.0, 0.09),
+        pause=(0.1, 0.3),
+        stir_turns=(3.2, 4.2),
+        hand="right",
+        hesitates=0.04,
+        regrasps=0.10,
+        orders=(SEQ_1, _WATER_EARLY),
+    ),
+    Participant(
+        "person_3",
+        embodiment="person",
+        look=Look((0.95, 0.78, 0.68), (0.22, 0.42, 0.30), (0.20, 0.22, 0.24)),
+        tempo=(1.55, 1.8),
+        lift=(0.065, 0.080),
+        bow=(-0.09, 0.0),
+        pause=(0.4, 0.9),
+        stir_turns=(2.5, 3.0),
+        hand="left",
+        hesitates=0.18,
+        regrasps=0.06,
+        orders=(SEQ_1, _MILK_LAST, _SUGAR_LAST),
+    ),
+)
+
+PARTICIPANTS: Mapping[str, Participant] = MappingProxyType(
+    {participant.name: participant for participant in (OPERATOR, *_PEOPLE)}
+)
+
+
+def sample_style(rng: np.random.Generator, participant: Participant = OPERATOR) -> Style:
+    """Draw the style of one demonstration by `participant`."""
     return Style(
-        tempo=rng.uniform(1.5, 1.9),
-        lift=rng.uniform(0.065, 0.085),
-        bow=rng.uniform(-0.06, 0.06),
-        pause=rng.uniform(0.2, 0.6),
-        stir_turns=rng.uniform(2.6, 3.6),
+        tempo=rng.uniform(*participant.tempo),
+        lift=rng.uniform(*participant.lift),
+        bow=rng.uniform(*participant.bow),
+        pause=rng.uniform(*participant.pause),
+        stir_turns=rng.uniform(*participant.stir_turns),
+        hand=participant.hand,
     )
 
 
-def varied(style: Style, rng: np.random.Generator) -> Style:
-    """The style as it comes out in one sub-task: nobody moves at the same tempo throughout."""
-    return replace(
-        style,
-        tempo=style.tempo * rng.uniform(0.94, 1.06),
-        pause=style.pause * rng.uniform(0.7, 1.3),
-    )
+def varied(style: Style, rng: np.random.Generator, participant: Participant = OPERATOR) -> Style:
+    """The style as it comes out in one sub-task: nobody does everything alike throughout."""
+    tempo, pause = rng.uniform(0.94, 1.06), rng.uniform(0.7, 1.3)
+    style = replace(style, tempo=style.tempo * tempo, pause=style.pause * pause)
+    if participant.hesitates and rng.random() < participant.hesitates:
+        style = replace(style, hesitation=rng.uniform(*_HESITATION))
+    if participant.regrasps and rng.random() < participant.regrasps:
+        style = replace(style, regrasp=True)
+    return style

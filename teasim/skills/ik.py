@@ -1,6 +1,9 @@
-"""Inverse kinematics of one arm, by mink's quadratic programs with the soft joint limits."""
+"""Inverse kinematics of one arm; YuMi's by mink's quadratic programs with the soft limits."""
 
+from collections.abc import Callable, Mapping
 from functools import cache
+from types import MappingProxyType
+from typing import Protocol
 
 import mink
 import numpy as np
@@ -8,6 +11,7 @@ import numpy as np
 from teasim.constants import ARM_JOINTS
 from teasim.errors import SkillError
 from teasim.skills.geometry import position
+from teasim.skills.hand_ik import HandKinematics
 from teasim.world.yumi import READY, planning_model
 
 POSITION_TOLERANCE = 5e-4
@@ -15,6 +19,19 @@ POSITION_TOLERANCE = 5e-4
 ANGLE_TOLERANCE = 5e-3
 """A solution is this near to the wanted orientation [rad]."""
 _ITERATIONS = 40
+
+
+class Kinematics(Protocol):
+    """Between the joints of one arm (n,) and the pose of its tool centre point."""
+
+    def prefer(self, posture: np.ndarray) -> None:
+        """Stay near `posture` (n,) where there is a choice."""
+
+    def pose(self, joints: np.ndarray) -> mink.SE3:
+        """Pose at `joints` (n,)."""
+
+    def solve(self, goal: mink.SE3, seed: np.ndarray) -> np.ndarray:
+        """Joints (n,) near `seed` (n,) that reach `goal`, or a `SkillError`."""
 
 
 class ArmKinematics:
@@ -82,7 +99,13 @@ class ArmKinematics:
         return bool(near and np.linalg.norm(error[3:]) < ANGLE_TOLERANCE)
 
 
+KINEMATICS: Mapping[str, Callable[[str], Kinematics]] = MappingProxyType(
+    {"yumi": ArmKinematics, "person": HandKinematics}
+)
+"""The kinematics of every embodiment."""
+
+
 @cache
-def kinematics(arm: str) -> ArmKinematics:
+def kinematics(arm: str, embodiment: str = "yumi") -> Kinematics:
     """The kinematics of an arm, made once per process."""
-    return ArmKinematics(arm)
+    return KINEMATICS[embodiment](arm)

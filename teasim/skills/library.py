@@ -23,7 +23,7 @@ class Skill:
     motion: Callable[[Arm, Manner], Motion]
     """Generator of targets, from READY back to READY, done well or in a mistaken manner."""
     postures: tuple[tuple[float, ...], ...] = ()
-    """Joint angles the arm may stay near [rad], kinematic order, best first; default READY."""
+    """Joint angles YuMi's arm may stay near [rad], kinematic order, best first; default READY."""
 
 
 # Found by random search over 60 layouts: the whole path from the grasp to the full tilt stays
@@ -53,13 +53,15 @@ SKILLS: Mapping[str, Skill] = MappingProxyType(
 
 
 def perform(subtask: str, simulation: Simulation, style: Style, manner: Manner = WELL) -> Motion:
-    """Targets (16,) that carry out `subtask`; feed each to `simulation.step` before the next.
+    """Targets that carry out `subtask`; feed each to `simulation.step` before the next.
 
     Raises:
         ConfigError: there is no such sub-task.
         SkillError: while iterating, when it cannot be done from the present state.
     """
     skill = SKILLS[check_subtask(subtask)]
-    arm = Arm(skill.arm, simulation, style, skill.postures)
+    body = simulation.embodiment
+    side = style.hand if style.hand and subtask in body.either_hand else skill.arm
+    arm = Arm(side, simulation, style, skill.postures if body.name == "yumi" else ())
     yield from arm.wait(style.pause)
     yield from skill.motion(arm, manner)

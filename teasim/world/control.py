@@ -3,15 +3,13 @@
 import mujoco
 import numpy as np
 
-from teasim.constants import ARM_JOINTS, ARMS, CONTROL_TIMESTEP, UPDATES_PER_CONTROL
+from teasim.constants import ARMS, CONTROL_TIMESTEP, UPDATES_PER_CONTROL
+from teasim.world.embodiments import YUMI, Embodiment
 from teasim.world.state import Saved
 
-FINGER_SPEED = 0.025
-"""Speed of each finger [m/s] (ABB servo gripper, default setting)."""
 BLOCKED_LAG = 0.004
 """A closing finger this far behind its command is held by something [m]."""
 
-_STRIDE = FINGER_SPEED * CONTROL_TIMESTEP / UPDATES_PER_CONTROL
 _S = (np.arange(UPDATES_PER_CONTROL)[:, None] + 0.5) / UPDATES_PER_CONTROL
 # Hermite cubic with given slopes at both ends, and its derivative (updates, 1).
 _START, _END = _S - 2 * _S**2 + _S**3, 2 * _S**2 - _S**3
@@ -28,8 +26,10 @@ class Controller(Saved):
 
     SAVED = ("_position", "_velocity", "_fingers")
 
-    def __init__(self, model: mujoco.MjModel) -> None:
-        joints = [name for arm in ARMS for name in ARM_JOINTS[arm]]
+    def __init__(self, model: mujoco.MjModel, embodiment: Embodiment = YUMI) -> None:
+        joints = [name for arm in ARMS for name in embodiment.joints[arm]]
+        self._count = len(joints)
+        self._stride = embodiment.finger_speed * CONTROL_TIMESTEP / UPDATES_PER_CONTROL
         self._arm_actuators = np.array([model.actuator(name).id for name in joints])
         self._finger_actuators = np.array([model.actuator(f"{arm}_gripper").id for arm in ARMS])
         self._joint_addresses = np.array([model.joint(name).qposadr[0] for name in joints])
@@ -40,29 +40,29 @@ class Controller(Saved):
         damping = -model.actuator_biasprm[self._arm_actuators, 2]
         self._feedforward = damping / gain  # cancels the lag of a damped position motor [s]
         self._limits = model.actuator_ctrlrange[self._arm_actuators]
-        self._position = np.zeros(14)
-        self._velocity = np.zeros(14)
+        self._position = np.zeros(self._count)
+        self._velocity = np.zeros(self._count)
         self._fingers = np.zeros(2)
 
     def reset(self, data: mujoco.MjData) -> None:
         """Hold the present positions."""
         state = self.measured(data)
-        self._position, self._velocity = state[:14].copy(), np.zeros(14)
-        self._fingers = state[14:] / 2
+        self._position, self._velocity = state[: self._count].copy(), np.zeros(self._count)
+        self._fingers = state[self._count :] / 2
 
     def measured(self, data: mujoco.MjData) -> np.ndarray:
-        """Joint angles [rad] and gripper openings [m] (16,), in the order of `STATE_NAMES`."""
+        """Joint angles [rad] and gripper openings [m] (2 n + 2,): right, left, openings."""
         return np.concatenate(
             [data.qpos[self._joint_addresses], 2 * data.qpos[self._finger_addresses]]
         )
 
     def commands(self, target: np.ndarray, data: mujoco.MjData) -> "_Segment":
-        """Start the control step towards `target` (16,)."""
-        goal = np.clip(target[:14], self._limits[:, 0], self._limits[:, 1])
-        segment = _Segment(self, self._position, self._velocity, goal, target[14:] / 2)
+        """Start the control step towards `target` (2 n + 2,)."""
+        goal = np.clip(target[: self._count], self._limits[:, 0], self._limits[:, 1])
+        segment = _Segment(self, self._position, self._velocity, goal, target[self._count :] / 2)
         self._velocity = (goal - self._position) / CONTROL_TIMESTEP
         self._position = goal
-        opening = target[14:] / 2 > self._fingers
+        opening = target[self._count :] / 2 > self._fingers
         # An opening hand starts from where its fingers are, not from the squeeze far inside.
         present = data.qpos[self._finger_addresses]
         self._fingers = np.where(opening, np.maximum(self._fingers, present), self._fingers)
@@ -96,6 +96,6 @@ class _Segment:
         present = data.qpos[control._finger_addresses].tolist()
         for finger, (goal, at) in enumerate(zip(self.fingers, present, strict=True)):
             command = float(control._fingers[finger])
-            stride = 10 * _STRIDE if at - command > BLOCKED_LAG else _STRIDE
+            stride = control._stride * (10 if at - command > BLOCKED_LAG else 1)
             control._fingers[finger] = command + min(max(goal - command, -stride), stride)
         data.ctrl[control._finger_actuators] = control._fingers

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from teasim.constants import ARM_JOINTS, ARMS
+from teasim.constants import ARMS
+from teasim.world.embodiments import EMBODIMENTS
 from teasim.world.simulation import Simulation
-from teasim.world.yumi import JOINT_SPEEDS
 
 TCP_SPEED_LIMIT = 1.5
 """Largest speed of the tool centre point [m/s] (ABB controller configuration)."""
@@ -29,7 +29,7 @@ def _role(model: mujoco.MjModel, geom: int) -> str:
     side = body.partition("_")[0]
     if side in ARMS:
         return f"{side}_fingers" if "finger" in body else f"{side}_arm"
-    if side == "yumi":
+    if side in EMBODIMENTS:
         return "torso"
     return str(name if body == "world" else body.partition("/")[0])
 
@@ -41,10 +41,10 @@ class Monitor:
         self._simulation = simulation
         model = simulation.model
         self._roles = roles(model)
-        joints = [name for arm in ARMS for name in ARM_JOINTS[arm]]
+        joints = [name for arm in ARMS for name in simulation.embodiment.joints[arm]]
         self._speeds = np.array([model.joint(name).dofadr[0] for name in joints])
         self._tools = np.array([model.site(f"{arm}_tcp").id for arm in ARMS])
-        self._limits = np.tile(JOINT_SPEEDS, len(ARMS))
+        self._limits = np.tile(simulation.embodiment.speeds, len(ARMS))
         self._before = (np.inf, np.zeros((len(ARMS), 3)))
         self.touches: dict[Pair, float] = {}
         """Deepest penetration of every pair of roles that touched [m], names in order."""

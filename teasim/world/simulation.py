@@ -6,18 +6,18 @@ import mujoco
 import numpy as np
 
 from teasim.constants import (
-    ARM_JOINTS,
     ARMS,
     PHYSICS_TIMESTEP,
     STEPS_PER_UPDATE,
     UPDATES_PER_CONTROL,
 )
 from teasim.world.control import Controller
+from teasim.world.embodiments import find_embodiment
 from teasim.world.events import Event, Recogniser
 from teasim.world.liquids import CONTENTS, VESSELS, Liquids, Stream
+from teasim.world.person import Look, wear
 from teasim.world.state import PhysicsState, SimulationState
 from teasim.world.station import FREE_BODIES, Layout, body_name, place, station_model
-from teasim.world.yumi import READY
 
 SETTLE_TIME = 0.8
 """Things come to rest for this long before an episode starts [s]."""
@@ -42,18 +42,25 @@ class Simulation:
     `model` and `data` may be read; whoever writes them is outside the contract.
     """
 
-    def __init__(self) -> None:
-        self.model = station_model()
+    def __init__(self, embodiment: str = "yumi") -> None:
+        """Build the station.
+
+        Raises:
+            ConfigError: there is no such embodiment.
+        """
+        self.embodiment = find_embodiment(embodiment)
+        self.model = station_model(embodiment)
         self.data = mujoco.MjData(self.model)
         self.liquids = Liquids(self.model)
         self.recogniser = Recogniser(self.model)
-        self._controller = Controller(self.model)
+        self._controller = Controller(self.model, self.embodiment)
+        self._paint_body = self.embodiment.painter(self.model)
         free = [self.model.joint(body_name(name)).qposadr[0] for name in FREE_BODIES]
         self._knob = self.model.joint("knob").qposadr[0]
         self._knob_body = self.model.body("knob").id
         self._poses = (np.array(free)[:, None] + np.arange(7)).ravel()
         self._glow = [self.model.geom("plate").id, self.model.geom("pilot").id]
-        self.target = np.zeros(16)
+        self.target = np.zeros(2 * self.embodiment.width + 2)
         self.observers: list[Callable[[], None]] = []
         """Called after every update, to look at the station and not to change it."""
 
@@ -61,8 +68,9 @@ class Simulation:
         """Set everything to `layout`, the arms to READY, and let things come to rest."""
         mujoco.mj_resetData(self.model, self.data)
         place(self.model, self.data, layout)
+        body = self.embodiment
         for arm in ARMS:
-            for name, angle in zip(ARM_JOINTS[arm], READY[arm], strict=True):
+            for name, angle in zip(body.joints[arm], body.ready[arm], strict=True):
                 self.data.joint(name).qpos = angle
         mujoco.mj_forward(self.model, self.data)
         self.liquids.reset()
@@ -74,8 +82,15 @@ class Simulation:
         self.recogniser.reset()
         self.data.time = 0.0
 
+    def dress(self, look: Look) -> None:
+        """Give the person at the station the colours of `look`."""
+        wear(self.model, look)
+
     def step(self, target: np.ndarray) -> None:
-        """Advance one control step towards `target` (16,): joint angles [rad], openings [m]."""
+        """Advance one control step towards `target`: joint angles [rad], openings [m].
+
+        The shape of `target` is (16,) for YuMi, (2 n + 2,) for a body with n joints per arm.
+        """
         self.target = np.array(target, dtype=float)
         segment = self._controller.commands(self.target, self.data)
         for update in range(UPDATES_PER_CONTROL):
@@ -134,7 +149,7 @@ class Simulation:
         return self.liquids.streams
 
     def joint_state(self) -> np.ndarray:
-        """Measured joint angles [rad] and gripper openings [m] (16,) float32."""
+        """Measured joint angles [rad] and gripper openings [m] (2 n + 2,) float32."""
         return self._controller.measured(self.data).astype(np.float32)
 
     def environment_state(self) -> np.ndarray:
@@ -146,8 +161,9 @@ class Simulation:
         return np.concatenate([self.data.qpos[self._poses], rest]).astype(np.float32)
 
     def paint(self) -> None:
-        """Bring what can be seen up to date: levels, colours, and the glow of the hob."""
+        """Bring what can be seen up to date: levels, colours, limbs, and the glow of the hob."""
         self.liquids.paint(self.model, self.data)
+        self._paint_body(self.data)
         plate, pilot = self._glow
         on = self.oven_on
         self.model.geom_matid[plate] = -1

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 
 from teasim.constants import PHYSICS_TIMESTEP, assets_folder
+from teasim.world.embodiments import find_embodiment
 from teasim.world.grain import add_grain
-from teasim.world.yumi import mount_yumi
 
 
 @dataclass(frozen=True)
@@ -115,12 +115,16 @@ def _moved(name: str, at: Placement, rng: np.random.Generator) -> Placement:
     return Placement(at.x + dx, at.y + dy, at.z, at.yaw + rng.uniform(-turn, turn))
 
 
-def station_spec() -> mujoco.MjSpec:
-    """Station with robot and props at their nominal places."""
+def station_spec(embodiment: str = "yumi") -> mujoco.MjSpec:
+    """Station with somebody to work at it and props at their nominal places.
+
+    Raises:
+        ConfigError: there is no such embodiment.
+    """
     folder = assets_folder()
     spec = mujoco.MjSpec.from_file(str(folder / "tea_station" / "scene.xml"))
     add_grain(spec)
-    mount_yumi(spec)
+    find_embodiment(embodiment).mount(spec)
     layout = nominal_layout()
     for name in (*FREE_BODIES, *_FIXED_BODIES[1:]):
         at = layout[name]
@@ -136,13 +140,17 @@ def station_spec() -> mujoco.MjSpec:
 
 
 @cache
-def _compiled() -> mujoco.MjModel:
-    return station_spec().compile()
+def _compiled(embodiment: str) -> mujoco.MjModel:
+    return station_spec(embodiment).compile()
 
 
-def station_model() -> mujoco.MjModel:
-    """Compiled station; every caller gets a copy of its own, since layouts are written into it."""
-    return copy.copy(_compiled())
+def station_model(embodiment: str = "yumi") -> mujoco.MjModel:
+    """Compiled station; every caller gets a copy of its own, since layouts are written into it.
+
+    Raises:
+        ConfigError: there is no such embodiment.
+    """
+    return copy.copy(_compiled(embodiment))
 
 
 def body_name(name: str) -> str:

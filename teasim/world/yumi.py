@@ -29,15 +29,18 @@ SOFT_LIMITS = np.array(
 JOINT_SPEEDS = np.radians((180, 180, 180, 180, 400, 400, 400))
 """Largest joint speeds [rad/s], kinematic order (7,) (ABB product specification 3HAC052982)."""
 
-# Bits of contype and conaffinity. Each arm meets everything but itself: its own links are kept
-# apart by the joint limits, and hull contacts between neighbours would be false.
-_CONTACT_BITS = {"right": (2, 1 | 4), "left": (4, 1 | 2)}
+FINGER_SPEED = 0.025
+"""Speed of each finger [m/s] (ABB servo gripper, default setting)."""
+
+CONTACT_BITS = {"right": (2, 1 | 4), "left": (4, 1 | 2)}
+"""Bits of contype and conaffinity per side. Each arm meets everything but itself: its own links are
+kept apart by the joint limits, and hull contacts between neighbours would be false."""
 
 
 def arm_spec(arm: str) -> mujoco.MjSpec:
     """Model of one arm, its contacts set up for the `arm` side ("right" or "left")."""
     spec = mujoco.MjSpec.from_file(str(assets_folder() / "abb_yumi" / "arm.xml"))
-    contype, conaffinity = _CONTACT_BITS[arm]
+    contype, conaffinity = CONTACT_BITS[arm]
     for geom in spec.geoms:
         if geom.group == 3:
             geom.contype, geom.conaffinity = contype, conaffinity

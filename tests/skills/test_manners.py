@@ -3,22 +3,21 @@
 import numpy as np
 import pytest
 
-from teasim.constants import ARMS
 from teasim.skills.arm import Style
 from teasim.skills.library import SKILLS, perform
 from teasim.task.mistakes import ABANDONED, INEFFECTIVE, MISSING_THE_CUP
 from teasim.task.scoring import spills
+from teasim.world.embodiments import EMBODIMENTS
 from teasim.world.monitor import PENETRATION_LIMIT, Monitor
-from teasim.world.yumi import READY
-from tests.skills.test_skills import poses, prepare, station
+from tests.skills.test_skills import home, poses, prepare, station
 
-HOME = np.concatenate([READY[arm] for arm in ARMS])
+CASES = [(e, s, m) for e in EMBODIMENTS for s in SKILLS for m in (INEFFECTIVE, ABANDONED)]
 
 
-@pytest.fixture(scope="module", params=[(s, m) for s in SKILLS for m in (INEFFECTIVE, ABANDONED)])
+@pytest.fixture(scope="module", params=CASES, ids=str)
 def vain(request):
-    subtask, manner = request.param
-    simulation = station(3)
+    embodiment, subtask, manner = request.param
+    simulation = station(3, embodiment)
     prepare(simulation, subtask)
     before, earlier = poses(simulation), len(simulation.events)
     monitor = Monitor(simulation)
@@ -37,7 +36,7 @@ def test_nothing_comes_of_it(vain):
 
 def test_the_arms_end_at_ready_and_nothing_is_bumped_into(vain):
     _, _, simulation, _, _, monitor = vain
-    assert simulation.joint_state()[:14] == pytest.approx(HOME, abs=1e-2)
+    assert simulation.joint_state()[:-2] == pytest.approx(home(simulation.embodiment), abs=1e-2)
     assert monitor.forbidden == ()
     assert monitor.penetration < PENETRATION_LIMIT
 

@@ -1,0 +1,181 @@
+"""Composition of a person: two flying hands in physics, and arms that are drawn after them.
+
+Only the hands push and hold. Forearms, upper arms and torso are shapes without contacts, put where
+a person's would be by closed-form kinematics of two links whenever a picture is taken.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from teasim.constants import ARMS, assets_folder
+from teasim.world.yumi import CONTACT_BITS
+
+HAND_JOINTS = {
+    arm: tuple(f"{arm}_{name}" for name in ("x", "y", "z", "roll", "pitch", "yaw")) for arm in ARMS
+}
+"""Place of the tool centre point [m], then turns about x, y, z in this order [rad], per hand."""
+
+HANDS_READY = {
+    "right": np.array([0.20, -0.27, 0.10, 0.10, np.radians(-50), np.radians(-60)]),
+    "left": np.array([0.20, 0.27, 0.10, -0.10, np.radians(-50), np.radians(60)]),
+}
+"""Start and rest pose of each hand (6,) [m, rad]: above the table's near edge, half palm down."""
+
+HAND_RANGE = np.array(
+    [(-0.05, 0.66), (-0.60, 0.60), (0.01, 0.55), (-2.5, 2.5), (-1.35, 1.35), (-3.3, 3.3)]
+)
+"""Planning limits of a hand's coordinates [m, rad] (6, 2), inside the hard limits of the model."""
+
+HAND_SPEEDS = np.array([1.1, 1.1, 1.1, 8.0, 8.0, 8.0])
+"""Largest speeds of a hand's coordinates [m/s, rad/s] (6,)."""
+
+POINTING_DOWN = {
+    "right": np.diag([1.0, -1.0, -1.0]),
+    "left": np.diag([-1.0, 1.0, -1.0]),
+}
+"""Orientation of the tool (3, 3) at zero turns: palms towards the person, thumbs near and inwards.
+
+A left hand's tool is turned by half a turn, so that for both hands -y of the tool is where the
+index finger is, and one grasp on an upright handle suits either: its upper end is at the index.
+"""
+
+UPPER_ARM = 0.31
+"""Length from shoulder to elbow [m]."""
+FOREARM = 0.27
+"""Length from elbow to wrist [m]."""
+WRIST = np.array([0.008, 0.0, -0.125])
+"""Where the forearm begins, in the hand's frame [m]."""
+SHOULDERS = {"right": np.array([-0.17, -0.19, 0.40]), "left": np.array([-0.17, 0.19, 0.40])}
+"""Places of the shoulders when the person stands upright [m]."""
+HIPS = np.array([-0.47, 0.0, -0.10])
+"""Where the torso turns when the person leans over the table [m]."""
+TORSO = 0.62
+"""How far down from the chest the torso is drawn [m]."""
+HEAD = {
+    "neck": np.array([0.015, 0.0, 0.08]),
+    "head": np.array([0.05, 0.0, 0.19]),
+    "hair": np.array([0.025, 0.0, 0.215]),
+}
+"""Middles of the parts above the chest, seen from there [m]."""
+_LONGEST = 0.96 * (UPPER_ARM + FOREARM)  # the person leans forward before an arm is straight
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours of a person, red green blue in [0, 1]."""
+
+    skin: tuple[float, float, float]
+    """Hands and face."""
+    sleeve: tuple[float, float, float]
+    """Forearms and upper arms."""
+    shirt: tuple[float, float, float]
+    """Torso."""
+    hair: tuple[float, float, float] = (0.16, 0.11, 0.08)
+    """Hair."""
+
+
+def wear(model: mujoco.MjModel, look: Look) -> None:
+    """Give the person in `model` the colours of `look`."""
+    for arm in ARMS:
+        model.mat(f"{arm}_skin").rgba[:3] = look.skin
+    for part in ("skin", "sleeve", "shirt", "hair"):
+        model.mat(f"person_{part}").rgba[:3] = getattr(look, part)
+
+
+def hand_spec(arm: str) -> mujoco.MjSpec:
+    """Model of one hand; what is seen of a left one is the right one's mirror image."""
+    spec = mujoco.MjSpec.from_file(str(assets_folder() / "person" / "hand.xml"))
+    contype, conaffinity = CONTACT_BITS[arm]
+    for geom in spec.geoms:
+        if geom.group == 3:
+            geom.contype, geom.conaffinity = contype, conaffinity
+    if arm == "left":
+        for geom in spec.geoms:
+            geom.pos[1] *= -1
+            geom.fromto[[1, 4]] *= -1  # stays "not a number" for shapes that have none
+        spec.site("tcp").quat = (0, 0, 0, 1)
+    return spec
+
+
+def mount_person(spec: mujoco.MjSpec) -> None:
+    """Put a person's body ("person_") and both hands ("right_", "left_") into the station."""
+    body = mujoco.MjSpec.from_file(str(assets_folder() / "person" / "body.xml"))
+    spec.attach(body, frame=spec.worldbody.add_frame(), prefix="person_")
+    for arm in ARMS:
+        spec.attach(hand_spec(arm), frame=spec.worldbody.add_frame(), prefix=f"{arm}_")
+
+
+class Limbs:
+    """Draws arms, torso and head after the hands."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        names = ("torso", "shoulders", *HEAD)
+        self._trunk = {name: model.geom(f"person_{name}").id for name in names}
+        self._hands = {arm: model.body(f"{arm}_hand").id for arm in ARMS}
+        self._forearms = {arm: model.geom(f"person_{arm}_forearm").id for arm in ARMS}
+        self._upper_arms = {arm: model.geom(f"person_{arm}_upper_arm").id for arm in ARMS}
+
+    def paint(self, data: mujoco.MjData) -> None:
+        """Write where the limbs are in the world; the next physics step puts them back."""
+        rotations = {arm: data.xmat[hand].reshape(3, 3) for arm, hand in self._hands.items()}
+        wrists = {
+            arm: data.xpos[hand] + rotations[arm] @ WRIST for arm, hand in self._hands.items()
+        }
+        lean = lean_towards(wrists)
+        for arm in ARMS:
+            shoulder = SHOULDERS[arm] + lean
+            elbow = elbow_of(arm, shoulder, wrists[arm], rotations[arm][:, 2])
+            _lay(data, self._forearms[arm], wrists[arm], elbow)
+            _lay(data, self._upper_arms[arm], elbow, shoulder)
+        self._paint_trunk(data, lean)
+
+    def _paint_trunk(self, data: mujoco.MjData, lean: np.ndarray) -> None:
+        right, left = SHOULDERS["right"] + lean, SHOULDERS["left"] + lean
+        chest = (right + left) / 2
+        back = (HIPS - chest) / np.linalg.norm(HIPS - chest)
+        _lay(data, self._trunk["torso"], chest + TORSO * back, chest)
+        _lay(data, self._trunk["shoulders"], right, left)
+        for name, offset in HEAD.items():
+            data.geom_xpos[self._trunk[name]] = chest + offset
+
+
+def lean_towards(wrists: Mapping[str, np.ndarray]) -> np.ndarray:
+    """How far the shoulders leave their place (3,) [m], so that no arm is too short for its wrist.
+
+    `wrists` holds the place (3,) [m] of each.
+    """
+    lean = np.zeros(3)
+    for arm, wrist in wrists.items():
+        way = wrist - SHOULDERS[arm] - lean
+        excess = np.linalg.norm(way) - _LONGEST
+        if excess > 0:
+            lean += way * excess / np.linalg.norm(way)
+    return lean
+
+
+def elbow_of(arm: str, shoulder: np.ndarray, wrist: np.ndarray, pointing: np.ndarray) -> np.ndarray:
+    """Place of the elbow (3,) [m] for a shoulder and a wrist (3,) [m] of a hand `pointing` (3,).
+
+    Of all places on the circle it is where the wrist bends least, rather outside than inside.
+    """
+    way = wrist - shoulder
+    distance = float(np.clip(np.linalg.norm(way), UPPER_ARM - FOREARM, _LONGEST))
+    along = way / np.linalg.norm(way)
+    middle = (distance**2 + UPPER_ARM**2 - FOREARM**2) / (2 * distance)
+    outwards = np.array([0.0, -0.6 if arm == "right" else 0.6, 0.0])
+    aside = outwards - pointing
+    aside = aside - along * (aside @ along)
+    aside = aside / max(float(np.linalg.norm(aside)), 1e-6)
+    return np.asarray(shoulder + along * middle + aside * np.sqrt(UPPER_ARM**2 - middle**2))
+
+
+def _lay(data: mujoco.MjData, geom: int, start: np.ndarray, end: np.ndarray) -> None:
+    """Put a shape in the middle between two places, its z axis along them, its x axis level."""
+    z = (end - start) / np.linalg.norm(end - start)
+    x = np.cross(z, (1.0, 0.0, 0.0))
+    x = x / max(float(np.linalg.norm(x)), 1e-6)
+    data.geom_xpos[geom] = (start + end) / 2
+    data.geom_xmat[geom] = np.column_stack([x, np.cross(z, x), z]).flatten()
