@@ -10,7 +10,7 @@ from teasim.errors import ConfigError, SkillError
 from teasim.skills.arm import Style
 from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform
-from teasim.skills.pace import MATCHED_SECONDS, Pace
+from teasim.skills.pace import Pace
 from teasim.task.mistakes import Plan
 from teasim.world.simulation import Simulation
 from teasim.world.station import sample_layout
@@ -54,7 +54,7 @@ def demonstrate(
     _take_place(simulation, participant)
     simulation.reset(sample_layout(rng))
     style = sample_style(rng, participant)
-    pace = Pace(plan.steps, rng.uniform(*MATCHED_SECONDS), rng) if match_length else None
+    pace = Pace(plan.steps, participant.embodiment, rng) if match_length else None
     for position, subtask in enumerate(plan.steps):
         elapsed = float(simulation.data.time)
         rest = pace.rest(position, elapsed, style) if pace else 0.0

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from teasim.errors import ConfigError
 from teasim.parallel import default_jobs
+
+if TYPE_CHECKING:
+    from teasim.generate import GenerateConfig
 
 
 @dataclass(frozen=True)
@@ -35,12 +38,21 @@ class GenerateArguments:
     """Ingredients that half of the demonstrations do without, rightly: add_sugar, add_milk."""
     match_length: bool = False
     """Draw out all demonstrations so that their length says nothing about them."""
+    embodiment: str = "yumi"
+    """Who demonstrates: yumi (with a joint log) or person (without)."""
+    participants: int = 3
+    """How many people take turns, 1 to 3."""
+    preset: str | None = None
+    """paper: the pools of the paper, 36 videos of people and 12 of YuMi, in two folders below POOL;
+    the counts above are not used then."""
     cameras: tuple[str, ...] = ("left", "cup")
     """Cameras that film: left, cup, front, top."""
     size: int = 224
     """Width and height of the videos in pixels."""
     quality: str = "fast"
     """Look of the pictures: fast or nice."""
+    look: str = "fixed"
+    """fixed, or random: light, colours, camera poses and things around differ in every video."""
     seed: int = 0
     """Seed of everything random; the same seed gives the same files."""
     jobs: int = default_jobs()
@@ -52,31 +64,34 @@ class GenerateArguments:
 def main(argv: Sequence[str] | None = None) -> int:
     """Render a pool of tea-making demonstrations, with mistakes in it when asked for."""
     arguments = tyro.cli(GenerateArguments, prog="teasim generate", args=argv)
-    mistakes = parse_mistakes(arguments.mistakes)
-    from teasim.generate import GenerateConfig, generate
+    pools = _pools(arguments)
+    from teasim.generate import generate
 
-    config = GenerateConfig(
-        seq1=arguments.seq1,
-        seq2=arguments.seq2,
-        seq3=arguments.seq3,
-        legal=arguments.legal,
-        mistakes=mistakes,
-        optional=arguments.optional,
-        match_length=arguments.match_length,
-        cameras=arguments.cameras,
-        size=arguments.size,
-        quality=arguments.quality,
-        seed=arguments.seed,
-    )
     start = time.perf_counter()
-    made = generate(arguments.pool, config, jobs=arguments.jobs, backend=arguments.backend)
+    remade = count = 0
+    for folder, config in pools.items():
+        made = generate(folder, config, jobs=arguments.jobs, backend=arguments.backend)
+        count, remade = count + len(made.pool.episodes), remade + made.remade
     seconds = time.perf_counter() - start
-    count = len(made.pool.episodes)
     print(
         f"{count} demonstrations in {arguments.pool} ({seconds:.0f} s, "
-        f"{made.remade} made again because they did not come out as labelled)"
+        f"{remade} made again because they did not come out as labelled)"
     )
     return 0
+
+
+def _pools(arguments: GenerateArguments) -> dict[Path, GenerateConfig]:
+    """The pools asked for by their folders, all checked before the first one is begun."""
+    mistakes = parse_mistakes(arguments.mistakes)
+    from teasim.generate import GenerateConfig
+    from teasim.generate.presets import find_preset
+
+    given = {field.name: getattr(arguments, field.name) for field in fields(GenerateConfig)}
+    if arguments.preset is None:
+        return {arguments.pool: GenerateConfig(**given | {"mistakes": mistakes})}
+    filmed = {name: given[name] for name in ("cameras", "size", "quality", "look", "seed")}
+    pools = find_preset(arguments.preset).items()
+    return {arguments.pool / name: replace(config, **filmed) for name, config in pools}
 
 
 def parse_mistakes(words: Sequence[str]) -> tuple[tuple[str, int], ...]:

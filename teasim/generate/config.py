@@ -6,11 +6,15 @@ import numpy as np
 
 from teasim.errors import ConfigError
 from teasim.render import check_cameras, check_look
+from teasim.skills.demonstrators import PARTICIPANTS, Participant
 from teasim.task.mistakes import Plan, spoil
 from teasim.task.recipes import SEQ_1
+from teasim.world.embodiments import EMBODIMENTS
 
 SIZES = (32, 1024)
 """Smallest and largest side of a video [pixels]."""
+LOOKS = ("fixed", "random")
+"""How the pictures of a pool vary."""
 OPTIONAL = ("add_sugar", "add_milk")
 """Ingredients that tea can do without, when a pool says so."""
 
@@ -31,6 +35,10 @@ class GenerateConfig:
     """Further incorrect demonstrations: Seq_1 with mistakes (NAME[@SUBTASK][+...], how many)."""
     optional: tuple[str, ...] = ()
     """Ingredients which every other demonstration, drawn at random, does without."""
+    embodiment: str = "yumi"
+    """Who demonstrates: yumi, with a joint log, or people, whose hands have none."""
+    participants: int = 3
+    """How many people take turns; the robot has one operator."""
     match_length: bool = False
     """Draw out all demonstrations so that their length says nothing."""
     cameras: tuple[str, ...] = ("left", "cup")
@@ -39,6 +47,8 @@ class GenerateConfig:
     """Width and height of the videos [pixels]; even."""
     quality: str = "fast"
     """Look of the pictures: fast or nice."""
+    look: str = "fixed"
+    """fixed, or random: light, colours, camera poses and things around differ in every video."""
     seed: int = 0
     """Seed of layouts, styles and mistakes."""
 
@@ -52,6 +62,7 @@ class GenerateConfig:
         check_cameras(self.cameras)
         check_look(self.size, self.size, self.quality)
         self._check_counts()
+        self._check_who()
         for name in self.optional:
             if name not in OPTIONAL:
                 raise ConfigError(
@@ -63,6 +74,12 @@ class GenerateConfig:
             )
         if self.seed < 0:
             raise ConfigError(f"The seed is {self.seed}; choose 0 or more.")
+
+    @property
+    def team(self) -> tuple[Participant, ...]:
+        """Those who take turns."""
+        able = [one for one in PARTICIPANTS.values() if one.embodiment == self.embodiment]
+        return tuple(able[: self.participants])
 
     @property
     def counts(self) -> dict[str, int]:
@@ -78,3 +95,16 @@ class GenerateConfig:
             spoil(Plan(SEQ_1), spec, np.random.default_rng(0))
         if not sum(self.counts.values()):
             raise ConfigError("The pool would be empty; ask for demonstrations with --seq1 N.")
+
+    def _check_who(self) -> None:
+        for name, value, choices in (
+            ("embodiment", self.embodiment, tuple(EMBODIMENTS)),
+            ("look", self.look, LOOKS),
+        ):
+            if value not in choices:
+                raise ConfigError(f"Unknown {name} '{value}'; choose {', '.join(choices)}.")
+        most = sum(one.embodiment == "person" for one in PARTICIPANTS.values())
+        if not 1 <= self.participants <= most:
+            raise ConfigError(
+                f"{self.participants} participants are asked for; choose 1 to {most}."
+            )

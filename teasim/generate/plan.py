@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teasim.generate.config import GenerateConfig
+from teasim.skills.demonstrators import Participant
 from teasim.task.mistakes import Plan, spoil
 from teasim.task.recipes import INCORRECT, LEGAL, OPTIMAL, SEQ_1, SEQ_2, SUBOPTIMAL, random_order
 
@@ -19,6 +20,8 @@ class DemoPlan:
     """seq_1, seq_2, seq_3 or legal."""
     plan: Plan
     """Steps and mistakes."""
+    participant: str = "yumi"
+    """Who demonstrates it."""
 
 
 def plan_pool(config: GenerateConfig) -> tuple[DemoPlan, ...]:
@@ -36,9 +39,24 @@ def plan_pool(config: GenerateConfig) -> tuple[DemoPlan, ...]:
         plans.append((INCORRECT, spoil(_recipe(SEQ_1, config, rng), spec, rng)))
     for spec, count in config.mistakes:
         plans += [(INCORRECT, spoil(_recipe(SEQ_1, config, rng), spec, rng)) for _ in range(count)]
-    plans += [(LEGAL, _recipe(random_order(rng), config, rng)) for _ in range(config.legal)]
+    team = config.team
+    for _ in range(config.legal):
+        who = team[len(plans) % len(team)]
+        plans.append((LEGAL, _recipe(_own_order(who, rng), config, rng)))
     order = rng.permutation(len(plans))
-    return tuple(DemoPlan(index, *plans[which]) for index, which in enumerate(order))
+    # They take turns kind by kind, so that nobody makes all the mistakes.
+    return tuple(
+        DemoPlan(index, *plans[which], participant=team[which % len(team)].name)
+        for index, which in enumerate(order)
+    )
+
+
+def _own_order(who: Participant, rng: np.random.Generator) -> tuple[str, ...]:
+    """A correct order: one of the participant's own half of the time, else any."""
+    own = who.orders[1:]
+    if own and rng.random() < 0.5:
+        return own[rng.integers(len(own))]
+    return random_order(rng)
 
 
 def _recipe(order: tuple[str, ...], config: GenerateConfig, rng: np.random.Generator) -> Plan:

@@ -14,9 +14,11 @@ from teasim.generate.plan import DemoPlan
 from teasim.pool import EpisodeRecord, EpisodeWriter, MistakeSpan, PoolHeader, Span
 from teasim.render import StationRenderer
 from teasim.rollout import Step, demonstrate
+from teasim.skills.demonstrators import PARTICIPANTS
 from teasim.task.mistakes import PlannedMistake
 from teasim.task.scoring import Verdict, judge, spills
 from teasim.world.liquids import VESSELS
+from teasim.world.looks import fixed_look, sample_look
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 
 ATTEMPTS = 6
@@ -26,15 +28,16 @@ _CONTENT = {f"add_{vessel.content}": vessel.content for vessel in VESSELS.values
 
 def pool_header(config: GenerateConfig) -> PoolHeader:
     """What all demonstrations of the pool have in common."""
+    person = config.embodiment == "person"  # a film of people comes without any log
     return PoolHeader(
         fps=FPS,
         cameras=config.cameras,
         height=config.size,
         width=config.size,
         subtasks=SUBTASKS,
-        state_names=STATE_NAMES,
-        environment_state_names=ENVIRONMENT_STATE_NAMES,
-        robot_type="abb_yumi",
+        state_names=None if person else STATE_NAMES,
+        environment_state_names=None if person else ENVIRONMENT_STATE_NAMES,
+        robot_type=None if person else "abb_yumi",
         config=asdict(config),
     )
 
@@ -70,13 +73,15 @@ def _record(
     writer: EpisodeWriter, config: GenerateConfig, demo: DemoPlan, rng: np.random.Generator
 ) -> str:
     """Write one attempt; return why it is not as labelled, or nothing when it is."""
-    simulation = Simulation()
+    simulation = Simulation(config.embodiment)
+    participant = PARTICIPANTS[demo.participant]
+    steps = demonstrate(
+        simulation, demo.plan, rng, match_length=config.match_length, participant=participant
+    )
     positions: list[int] = []
-    with StationRenderer(
-        simulation, width=config.size, height=config.size, quality=config.quality
-    ) as renderer:
+    with _camera(simulation, config, demo) as renderer:
         rewarded = False
-        for step in demonstrate(simulation, demo.plan, rng, match_length=config.match_length):
+        for step in steps:
             success = _verdict(simulation).success
             _add_frame(writer, simulation, renderer, config, step, success, not rewarded)
             rewarded = rewarded or success
@@ -85,6 +90,15 @@ def _record(
     if not reason:
         writer.finish(_episode_record(demo, positions, config.seed))
     return reason
+
+
+def _camera(simulation: Simulation, config: GenerateConfig, demo: DemoPlan) -> StationRenderer:
+    # Its own randomness: a pool in another look holds the same demonstrations.
+    rng = np.random.default_rng([config.seed, 2, demo.index])
+    look = sample_look(rng) if config.look == "random" else fixed_look()
+    return StationRenderer(
+        simulation, width=config.size, height=config.size, quality=config.quality, look=look
+    )
 
 
 def _add_frame(
@@ -96,11 +110,12 @@ def _add_frame(
     success: bool,
     first: bool,
 ) -> None:
+    logged = config.embodiment != "person"
     writer.add_frame(
         images=renderer.frames(config.cameras),
-        state=simulation.joint_state(),
-        action=step.target,
-        environment_state=simulation.environment_state(),
+        state=simulation.joint_state() if logged else None,
+        action=step.target if logged else None,
+        environment_state=simulation.environment_state() if logged else None,
         subtask_index=SUBTASKS.index(step.subtask),
         reward=float(success and first),
         success=success,
@@ -152,8 +167,8 @@ def _episode_record(demo: DemoPlan, positions: Sequence[int], seed: int) -> Epis
         correct=not demo.plan.mistakes,
         mistakes=tuple(mistakes),
         spans=spans,
-        participant="yumi",
-        embodiment="yumi",
+        participant=demo.participant,
+        embodiment=PARTICIPANTS[demo.participant].embodiment,
         seed=seed,
     )
 

@@ -75,6 +75,8 @@ OPERATOR = Participant(
     bow=(-0.06, 0.06),
     pause=(0.2, 0.6),
     stir_turns=(2.6, 3.6),
+    hesitates=0.06,
+    regrasps=0.04,
 )
 """The robot, led by its operator, who is always the same."""
 

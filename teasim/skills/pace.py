@@ -1,37 +1,50 @@
 """How a demonstration is drawn out to a length that says nothing about what was done in it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
 from teasim.skills.arm import Style
 
-MATCHED_SECONDS = (96.0, 112.0)
-"""Length-matched demonstrations last uniformly between these [s], whatever happens in them."""
+STRETCH = (1.3, 1.5)
+"""Length-matched demonstrations last uniformly between these, in typical lengths of Seq_1."""
 
-TYPICAL_SECONDS = MappingProxyType(
+TYPICAL_SECONDS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
-        "turn_on_oven": 6.5,
-        "add_water": 14.4,
-        "add_sugar": 13.3,
-        "add_milk": 13.8,
-        "add_tea_bag": 7.6,
-        "stir": 11.4,
-        "turn_off_oven": 9.1,
+        "yumi": {
+            "turn_on_oven": 6.5,
+            "add_water": 14.4,
+            "add_sugar": 13.3,
+            "add_milk": 13.8,
+            "add_tea_bag": 7.6,
+            "stir": 11.4,
+            "turn_off_oven": 9.1,
+        },
+        "person": {
+            "turn_on_oven": 5.0,
+            "add_water": 11.8,
+            "add_sugar": 10.2,
+            "add_milk": 9.8,
+            "add_tea_bag": 8.1,
+            "stir": 11.8,
+            "turn_off_oven": 5.3,
+        },
     }
 )
-"""What a sub-task takes at the default tempo [s]; the sum is a demonstration."""
+"""What a sub-task takes each embodiment at the default tempo [s]."""
 
 
 class Pace:
     """Rests between sub-tasks that make a demonstration last as long as it is meant to."""
 
-    def __init__(self, steps: Sequence[str], length: float, rng: np.random.Generator) -> None:
-        """Plan rests of random shares before each of `steps`, for `length` seconds in all."""
-        self._expected = [TYPICAL_SECONDS[name] for name in steps]
+    def __init__(self, steps: Sequence[str], embodiment: str, rng: np.random.Generator) -> None:
+        """Draw the length and the shares of it that are rests before each of `steps`."""
+        typical = TYPICAL_SECONDS[embodiment]
+        self._expected = [typical[name] for name in steps]
+        self.length = float(rng.uniform(*STRETCH) * sum(typical.values()))
+        """How long the demonstration is to last [s]."""
         self._shares = rng.dirichlet(np.full(len(steps) + 1, 2.0))
-        self.length = length
 
     def rest(self, position: int, elapsed: float, style: Style) -> float:
         """Seconds to rest before step number `position`, `elapsed` seconds after the start."""

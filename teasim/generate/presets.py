@@ -1,0 +1,30 @@
+"""Sets of pools that are made by one word."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from teasim.errors import ConfigError
+from teasim.generate.config import GenerateConfig
+
+PRESETS: Mapping[str, Mapping[str, GenerateConfig]] = MappingProxyType(
+    {
+        # The paper (section 4): 36 videos of three people and 12 of a tele-operated YuMi, most of
+        # them Seq_1. It does not say how many of the others; its pools need 4 Seq_2 and 2 Seq_3.
+        "paper": {
+            "people": GenerateConfig(seq1=20, seq2=10, seq3=6, embodiment="person"),
+            "yumi": GenerateConfig(seq1=6, seq2=4, seq3=2),
+        },
+    }
+)
+"""Pools by the folder they go to; people have no joint log, so they are a pool of their own."""
+
+
+def find_preset(name: str) -> Mapping[str, GenerateConfig]:
+    """Return the pools of a preset.
+
+    Raises:
+        ConfigError: there is none of that name.
+    """
+    if name not in PRESETS:
+        raise ConfigError(f"Unknown preset '{name}'; choose {', '.join(PRESETS)}.")
+    return PRESETS[name]
