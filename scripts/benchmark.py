@@ -174,7 +174,7 @@ def environment(repeats: int) -> dict[str, float]:
     recording = Recording.of(env.unwrapped._simulation)  # type: ignore[attr-defined]
     for action in actions:
         env.step(action)
-    recording.simulation.observers.clear()
+    recording.simulation.observers.pop()  # the environment's own one stays
 
     def steps() -> None:
         for action in actions:

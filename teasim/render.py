@@ -1,5 +1,6 @@
 """Pictures of the station, rendered off screen; OpenGL is started lazily, once per process."""
 
+import os
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
@@ -10,17 +11,30 @@ import numpy as np
 from teasim.constants import CAMERAS, QUALITIES
 from teasim.errors import ConfigError, RenderError
 from teasim.gl import choose_gl
-from teasim.world.liquids import Stream
+from teasim.world.dressing import apply_look
+from teasim.world.liquids import VESSELS, Stream
+from teasim.world.looks import Look
+from teasim.world.segments import SEGMENT_NAMES, segments
 from teasim.world.simulation import Simulation
 
 STREAM_RADIUS = 0.003
 """Radius of a stream in the picture [m]."""
-SHADOW_MAP = 4096
-"""Side of the shadow map in `nice` quality [pixels]."""
+SHADOW_MAP = 2048
+"""Side of the shadow map in `nice` quality [pixels]; 4096 takes three times as long."""
+SHADOWED = 1.45
+"""Shadows reach this far from where the lamp points, in extents of the model."""
+SMOOTHING = 2
+"""Pictures of `nice` quality are drawn this many times as large and averaged."""
+FAR = 30.0
+"""How far one sees in `nice` quality, in extents of the model."""
 LARGEST_SIDE = 4096
 """Largest width and height of a picture [pixels]."""
-_PLAIN_FLOOR = (0.50, 0.51, 0.53, 1.0)
+_TEXTURED = {"floor": "floor", "table": "table_grain"}
+_PLAIN = {"floor": "floor_plain", "table": "table"}
 _SHOWN_GROUPS = (0, 1, 2)
+_GEOM, _DECORATION = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_UNKNOWN)
+_STREAM = SEGMENT_NAMES.index("stream")
+_processes: set[int] = set()  # that started OpenGL: this one, or one it was forked from
 
 
 class StationRenderer:
@@ -31,28 +45,33 @@ class StationRenderer:
     """
 
     def __init__(
-        self, simulation: Simulation, *, width: int, height: int, quality: str = "fast"
+        self,
+        simulation: Simulation,
+        *,
+        width: int,
+        height: int,
+        quality: str = "fast",
+        look: Look | None = None,
     ) -> None:
-        """Start OpenGL.
+        """Start OpenGL; with a `look`, dress the station in it.
 
         Raises:
             ConfigError: unknown quality, or a side out of range.
-            RenderError: no headless back end works.
+            RenderError: no headless back end works, or none can after a fork.
         """
         check_look(width, height, quality)
+        check_not_forked()
         choose_gl()
         self._simulation = simulation
         self._model = simulation.model
-        self._set_quality(quality)
-        buffer = self._model.vis.global_  # a larger one would have to be cleared every time
-        buffer.offwidth, buffer.offheight = width, height
-        try:
-            self._renderer = mujoco.Renderer(self._model, height, width)
-        except Exception as error:  # every back end fails in its own way
-            raise RenderError(
-                f"Rendering could not be started ({error}); run 'teasim doctor' for the cure."
-            ) from error
-        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = quality == "nice"
+        if look is not None:
+            self.wear(look)
+        self._quality, self._size = quality, (height, width)
+        self._far = self._model.vis.map.zfar
+        self._set_quality()
+        self._renderer = self._start(SMOOTHING if quality == "nice" else 1)
+        self._meter: mujoco.Renderer | None = None
+        self._segments = segments(self._model)
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = [group in _SHOWN_GROUPS for group in range(6)]
         self._option.sitegroup[:] = 0
@@ -72,7 +91,14 @@ class StationRenderer:
 
     def close(self) -> None:
         """Close the OpenGL context; safe to call twice."""
+        self._model.vis.map.zfar = self._far  # the next renderer may be of the other quality
         self._renderer.close()
+        if self._meter is not None:
+            self._meter.close()
+
+    def wear(self, look: Look) -> None:
+        """Dress the station in another look."""
+        apply_look(self._model, look, self._simulation.data)
 
     def frames(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
         """One (height, width, 3) uint8 RGB picture per camera of the present state."""
@@ -84,22 +110,100 @@ class StationRenderer:
         self._simulation.paint()
         return self._frame(camera)
 
-    def _frame(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
-        self._renderer.update_scene(self._simulation.data, camera=camera, scene_option=self._option)
-        for stream in self._simulation.streams:
-            _draw_stream(self._renderer.scene, stream)
-        return np.asarray(self._renderer.render())
+    def masks(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
+        """What is seen in every pixel, per camera: (height, width) int32 of `SEGMENT_NAMES`."""
+        self._simulation.paint()
+        meter = self._measuring()
+        meter.enable_segmentation_rendering()
+        try:
+            return {camera: self._mask(meter, camera) for camera in cameras}
+        finally:
+            meter.disable_segmentation_rendering()
 
-    def _set_quality(self, quality: str) -> None:
-        nice = quality == "nice"
-        visual = self._model.vis.quality
-        visual.shadowsize = SHADOW_MAP if nice else 0
-        visual.offsamples = 4 if nice else 0
-        visual.numslices = 32 if nice else 16
-        floor = self._model.geom("floor")
-        if not nice:
-            floor.matid = -1  # its texture is a quarter of the cost of a frame
-            floor.rgba = _PLAIN_FLOOR
+    def depths(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
+        """How far it is along the camera's axis, per camera: (height, width) float32 [m].
+
+        Where there is nothing but sky, it is the distance of the far clipping plane.
+        """
+        self._simulation.paint()
+        meter = self._measuring()
+        meter.enable_depth_rendering()
+        try:
+            return {camera: self._draw(meter, camera) for camera in cameras}
+        finally:
+            meter.disable_depth_rendering()
+
+    def _frame(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
+        picture = self._draw(self._renderer, camera)
+        height, width = self._size
+        if picture.shape[0] == height:
+            return picture
+        blocks = picture.reshape(height, SMOOTHING, width, SMOOTHING, 3)
+        return np.asarray(np.rint(blocks.mean(axis=(1, 3))), np.uint8)
+
+    def _mask(self, meter: mujoco.Renderer, camera: str) -> np.ndarray:
+        shape, kind = np.moveaxis(self._draw(meter, camera), -1, 0)
+        mask = np.zeros(shape.shape, np.int32)
+        seen = kind == _GEOM
+        mask[seen] = self._segments[shape[seen]]
+        mask[kind == _DECORATION] = _STREAM
+        return mask
+
+    def _draw(self, renderer: mujoco.Renderer, camera: str | mujoco.MjvCamera) -> np.ndarray:
+        renderer.update_scene(self._simulation.data, camera=camera, scene_option=self._option)
+        for stream in self._simulation.streams:
+            _draw_stream(renderer.scene, stream)
+        return np.asarray(renderer.render())
+
+    def _measuring(self) -> mujoco.Renderer:
+        """Renderer without smoothing, which would mix the numbers of neighbours at an edge."""
+        if self._quality == "fast":
+            return self._renderer
+        if self._meter is None:
+            self._meter = self._start(1)
+        return self._meter
+
+    def _start(self, scale: int) -> mujoco.Renderer:
+        height, width = (scale * side for side in self._size)
+        buffer = self._model.vis.global_  # a larger one would have to be cleared every time
+        buffer.offwidth, buffer.offheight = width, height
+        try:
+            most = self._model.ngeom + len(VESSELS)  # every vessel may pour
+            renderer = mujoco.Renderer(self._model, height, width, max_geom=most)
+        except Exception as error:  # every back end fails in its own way
+            raise RenderError(
+                f"Rendering could not be started ({error}); run 'teasim doctor' for the cure."
+            ) from error
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = scale > 1
+        return renderer
+
+    def _set_quality(self) -> None:
+        nice = self._quality == "nice"
+        model = self._model
+        model.vis.quality.shadowsize = SHADOW_MAP if nice else 0
+        model.vis.quality.offsamples = 0
+        model.vis.quality.numslices = 32 if nice else 16
+        model.light_active[model.light("fill").id] = nice
+        if nice:
+            model.vis.map.zfar, model.vis.map.shadowclip = FAR, SHADOWED
+        # The texture of the floor alone is a quarter of the cost of a frame.
+        surfaces = _TEXTURED if nice else _PLAIN
+        for geom, material in surfaces.items():
+            model.geom(geom).matid = model.mat(material).id
+
+
+def check_not_forked() -> None:
+    """Refuse what would hang: OpenGL's threads do not survive a fork.
+
+    Raises:
+        RenderError: a process that this one was forked from has rendered.
+    """
+    if _processes and os.getpid() not in _processes:
+        raise RenderError(
+            "This process was forked from one that has rendered, which OpenGL does not survive; "
+            "start it with multiprocessing's 'spawn' (vector_kwargs={'context': 'spawn'})."
+        )
+    _processes.add(os.getpid())
 
 
 def check_cameras(cameras: Sequence[str]) -> tuple[str, ...]:
@@ -144,4 +248,5 @@ def _draw_stream(scene: Any, stream: Stream) -> None:
     mujoco.mjv_connector(
         geom, mujoco.mjtGeom.mjGEOM_CAPSULE, STREAM_RADIUS, stream.start, stream.end
     )
+    geom.segid, geom.objtype, geom.objid = scene.ngeom, _DECORATION, -1
     scene.ngeom += 1

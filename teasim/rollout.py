@@ -1,6 +1,6 @@
-"""One demonstration carried out in physics, frame by frame, with the physics' own verdict."""
+"""One demonstration carried out in physics, frame by frame, and carried out again from its log."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,8 @@ class Step:
     position: int
     """Index of that sub-task in the demonstration."""
     target: np.ndarray
-    """Joint angles [rad] and openings [m] to go to: (16,) for YuMi, (14,) for a person."""
+    """Where to go, float32 as it is logged: joint angles [rad] and openings [m] (16,) for YuMi,
+    (14,) for a person."""
 
 
 def demonstrate(
@@ -43,7 +44,8 @@ def demonstrate(
 
     With `match_length` it rests in between so that it lasts as long as any other demonstration.
     The simulation stands before each yielded step, so a caller can look at it, and is advanced
-    when the next one is asked for.
+    when the next one is asked for. It goes to the float32 targets that a log holds, so `replay`
+    gives the same bits.
 
     Raises:
         ConfigError: the simulation has not the participant's body.
@@ -59,8 +61,7 @@ def demonstrate(
         yield from _rest(simulation, subtask, position, rest)
         now = varied(style, rng, participant)
         for target in perform(subtask, simulation, now, plan.manner(position)):
-            yield Step(subtask, position, target)
-            simulation.step(target)
+            yield from _advance(simulation, subtask, position, target)
     rest = pace.length - float(simulation.data.time) if pace else FINAL_REST
     if rest < FINAL_REST - CONTROL_TIMESTEP:
         raise SkillError(f"The demonstration took {FINAL_REST - rest:.1f} s longer than it may.")
@@ -79,8 +80,34 @@ def _take_place(simulation: Simulation, participant: Participant) -> None:
 
 def _rest(simulation: Simulation, subtask: str, position: int, seconds: float) -> Iterator[Step]:
     for _ in range(round(seconds / CONTROL_TIMESTEP)):
-        yield Step(subtask, position, simulation.target)
-        simulation.step(simulation.target)
+        yield from _advance(simulation, subtask, position, simulation.target)
+
+
+def _advance(
+    simulation: Simulation, subtask: str, position: int, target: np.ndarray
+) -> Iterator[Step]:
+    logged = target.astype(np.float32)
+    yield Step(subtask, position, logged)
+    simulation.step(logged)
+
+
+def replay(
+    simulation: Simulation, targets: Iterable[np.ndarray], rng: np.random.Generator
+) -> Iterator[np.ndarray]:
+    """Carry a demonstration out again from its log.
+
+    The simulation stands before each yielded target, as in `demonstrate`, and after the last one
+    when the iterator is exhausted.
+
+    Args:
+        simulation: the station; it is reset to the layout that `rng` draws.
+        targets: the log, the column `action` of a pool: angles [rad] and openings [m] (16,) each.
+        rng: a generator as `demonstrate` was given it; `teasim.generate.demo_rng` for a pool's.
+    """
+    simulation.reset(sample_layout(rng))
+    for target in targets:
+        yield target
+        simulation.step(target)
 
 
 def run_subtask(simulation: Simulation, subtask: str, style: Style) -> int:

@@ -1,6 +1,8 @@
 """What both environments share: the station, how it is reset, seen and judged."""
 
-from collections.abc import Sequence
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -13,10 +15,25 @@ from teasim.render import StationRenderer, check_cameras, check_look
 from teasim.task.recipes import allowed_next, next_correct
 from teasim.task.scoring import Verdict, judge
 from teasim.world.simulation import Simulation
+from teasim.world.state import SimulationState
 from teasim.world.station import nominal_layout, sample_layout
 
 RENDER_SIZE = (480, 640)
 """Height and width of `render()` when the observations hold no pictures [pixels]."""
+
+
+@dataclass(frozen=True)
+class EnvState:
+    """An environment between two steps; it can be pickled."""
+
+    env: str
+    """Class of the environment."""
+    simulation: SimulationState
+    """The station."""
+    random: Mapping[str, Any]
+    """State of the generator that the next resets draw from."""
+    progress: Any
+    """What the environment itself counts."""
 
 
 class StationEnv(gymnasium.Env[dict[str, Any], Any]):
@@ -84,6 +101,38 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+
+    def get_state(self) -> EnvState:
+        """Everything the environment's future depends on, apart from the actions to come.
+
+        Wrappers count for themselves: the steps of Gymnasium's `TimeLimit` are not in it.
+        """
+        return EnvState(
+            type(self).__name__,
+            self._simulation.get_state(),
+            copy.deepcopy(self.np_random.bit_generator.state),
+            self._progress(),
+        )
+
+    def set_state(self, state: EnvState) -> None:
+        """Go back to `state`: the same actions then give the same bits as they gave from there.
+
+        Raises:
+            ConfigError: the state was taken from another environment; nothing has changed then.
+        """
+        if state.env != type(self).__name__:
+            raise ConfigError(f"The state is of {state.env}; this is {type(self).__name__}.")
+        self._simulation.set_state(state.simulation)
+        self.np_random.bit_generator.state = copy.deepcopy(dict(state.random))
+        self._set_progress(state.progress)
+
+    def _progress(self) -> Any:
+        """What a subclass counts, for `get_state`."""
+        raise NotImplementedError
+
+    def _set_progress(self, progress: Any) -> None:
+        """Go back to what `_progress` gave."""
+        raise NotImplementedError
 
     def _pictures(self) -> StationRenderer:
         if self._renderer is None:

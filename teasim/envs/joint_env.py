@@ -1,52 +1,82 @@
 """`teasim/TeaMaking-v0`: joint targets of both arms and gripper openings at 10 Hz."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from teasim.constants import ARM_JOINTS, ARMS, GRIPPER_OPEN, GRIPPER_SQUEEZE, SUBTASKS
+from teasim.envs.actions import check_action, make_control
 from teasim.envs.base import StationEnv
+from teasim.envs.rewards import RewardTerms, RewardWeights
 
 
 class TeaMakingEnv(StationEnv):
     """Drive both arms: 14 joint targets, then the openings of the right and the left gripper.
 
-    Actions in [-1, 1] span the joints' ranges; for the grippers -1 squeezes with full force and 1
-    is wide open. Each completed sub-task earns 1/7, the goal 1.
+    Actions are in [-1, 1]; beyond it they are clipped. For the grippers -1 squeezes with full force
+    and 1 is wide open. For the joints `control` says what they mean: with `position` they span the
+    joints' ranges; with `delta` they change the last target by at most `DELTA_SHARE` of what the
+    joint's largest speed covers in a step.
+
+    Each sub-task that is completed for the first time earns 1/7 and the goal 1; spilling, bumping
+    and leaving the oven on cost a little. `info["reward_terms"]` has the terms of `RewardTerms`;
+    the reward is their sum weighted by `RewardWeights`.
     """
 
-    def __init__(self, **kwargs: Any) -> None:
-        """Take the arguments of `StationEnv`."""
+    def __init__(
+        self,
+        *,
+        control: str = "position",
+        reward_weights: Mapping[str, float] | None = None,
+        **kwargs: Any,
+    ) -> None:
+        """Build the station.
+
+        Args:
+            control: Meaning of the joints' actions, position or delta.
+            reward_weights: Weights of terms of the reward that are not to be the default ones.
+            **kwargs: The arguments of `StationEnv`.
+
+        Raises:
+            ConfigError: an argument is unknown or out of range.
+        """
+        self._weights = RewardWeights.of(reward_weights)
         super().__init__(**kwargs)
-        model = self._simulation.model
-        ranges = [model.joint(name).range for arm in ARMS for name in ARM_JOINTS[arm]]
-        limits = np.array([*ranges, *[(GRIPPER_SQUEEZE, GRIPPER_OPEN)] * 2])
-        self._middle = limits.mean(axis=1)
-        self._reach = np.ptp(limits, axis=1) / 2
+        self._control = make_control(control, self._simulation.model)
+        self._terms = RewardTerms(self._simulation)
         self.action_space = spaces.Box(-1.0, 1.0, (16,), np.float32)
-        self._counted = 0
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start a new episode."""
-        self._counted = 0
-        return super().reset(seed=seed, options=options)
+        observation, info = super().reset(seed=seed, options=options)
+        self._terms.reset()
+        return observation, info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Advance 0.1 s towards the targets."""
-        self._simulation.step(self.target(np.asarray(action, dtype=np.float64)))
+        """Advance 0.1 s towards the targets.
+
+        Raises:
+            ConfigError: the action is not 16 finite numbers; nothing has moved then.
+        """
+        self._simulation.step(self.target(check_action(action)))
         verdict = self._verdict()
-        different = len(set(self._simulation.subtasks_done))
-        reward = (different - self._counted) / len(SUBTASKS) + float(verdict.success)
-        self._counted = different
-        return self._observation(), reward, verdict.success, False, self._info(verdict)
+        terms = self._terms.take(verdict)
+        info = self._info(verdict) | {"reward_terms": terms}
+        return self._observation(), self._weights.total(terms), verdict.success, False, info
 
     def target(self, action: np.ndarray) -> np.ndarray:
-        """Joint angles [rad] and openings [m] (16,) of an action in [-1, 1]."""
-        return np.asarray(self._middle + self._reach * np.clip(action, -1, 1))
+        """Joint angles [rad] and openings [m] (16,) that an action (16,) means now."""
+        return self._control.target(action, self._simulation.target)
 
     def action(self, target: np.ndarray) -> np.ndarray:
-        """Action in [-1, 1] (16,) float32 of joint angles [rad] and openings [m]."""
-        return ((target - self._middle) / self._reach).astype(np.float32)
+        """Action (16,) float32 that means these joint angles [rad] and openings [m] now."""
+        return self._control.action(target, self._simulation.target).astype(np.float32)
+
+    def _progress(self) -> Any:
+        return self._terms.state()
+
+    def _set_progress(self, progress: Any) -> None:
+        self._terms.restore(progress)

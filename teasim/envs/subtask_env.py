@@ -54,13 +54,17 @@ class TeaMakingSubtasksEnv(StationEnv):
         return super().reset(seed=seed, options=options)
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Carry out sub-task number `action`."""
-        refused = self._carry_out(SUBTASKS[int(action)])
+        """Carry out sub-task number `action`.
+
+        Raises:
+            ConfigError: there is no sub-task of that number; nothing has moved then.
+        """
+        refused = self._carry_out(_subtask(action))
         self._actions += 1
         verdict = self._verdict()
-        info = self._info(verdict) | {"refused": refused}
-        truncated = not verdict.success and self._actions >= self._max_actions
         reward = float(verdict.success)
+        info = self._info(verdict) | {"refused": refused, "reward_terms": {"success": reward}}
+        truncated = not verdict.success and self._actions >= self._max_actions
         return self._observation(), reward, verdict.success, truncated, info
 
     def _carry_out(self, subtask: str) -> str:
@@ -76,3 +80,16 @@ class TeaMakingSubtasksEnv(StationEnv):
         target = np.array(self._simulation.target)
         for _ in range(round(REFUSED_SECONDS / CONTROL_TIMESTEP)):
             self._simulation.step(target)
+
+    def _progress(self) -> Any:
+        return self._actions
+
+    def _set_progress(self, progress: Any) -> None:
+        self._actions = progress
+
+
+def _subtask(action: Any) -> str:
+    number = np.asarray(action)
+    if number.dtype.kind in "iu" and number.size == 1 and 0 <= number.item() < len(SUBTASKS):
+        return SUBTASKS[number.item()]
+    raise ConfigError(f"Unknown action {action!r}; choose a number from 0 to {len(SUBTASKS) - 1}.")

@@ -39,6 +39,11 @@ def pool_header(config: GenerateConfig) -> PoolHeader:
     )
 
 
+def demo_rng(seed: int, index: int, attempt: int = 0) -> np.random.Generator:
+    """Randomness of one attempt at a pool's demonstration; nearly always the first one is kept."""
+    return np.random.default_rng([seed, 1, index, attempt])
+
+
 def generate_demo(root: Path, config: GenerateConfig, demo: DemoPlan) -> int:
     """Carry one demonstration out until it comes out as labelled; return the attempts it took.
 
@@ -47,7 +52,7 @@ def generate_demo(root: Path, config: GenerateConfig, demo: DemoPlan) -> int:
     """
     reason = ""
     for attempt in range(ATTEMPTS):
-        rng = np.random.default_rng([config.seed, 1, demo.index, attempt])
+        rng = demo_rng(config.seed, demo.index, attempt)
         with EpisodeWriter(root, demo.index, pool_header(config)) as writer:
             try:
                 reason = _record(writer, config, demo, rng)
@@ -94,7 +99,7 @@ def _add_frame(
     writer.add_frame(
         images=renderer.frames(config.cameras),
         state=simulation.joint_state(),
-        action=step.target.astype(np.float32),
+        action=step.target,
         environment_state=simulation.environment_state(),
         subtask_index=SUBTASKS.index(step.subtask),
         reward=float(success and first),

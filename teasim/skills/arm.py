@@ -196,16 +196,17 @@ class Arm:
         yield from self.wait(SECOND_THOUGHTS)
         yield from self.line(start)
 
-    def choose_posture(self, curves: Sequence[Curve]) -> None:
-        """Stay near the first of the arm's postures in which all `curves` can be followed.
+    def choose_way(self, ways: Sequence[Sequence[Curve]]) -> int:
+        """Number of the first way all curves of which can be followed; stay near its posture.
 
         Raises:
-            SkillError: there is none.
+            SkillError: there is none, from any of the arm's postures.
         """
-        for posture in self._postures:
-            self._prefer(posture)
-            if self._can_follow(curves):
-                return
+        for number, curves in enumerate(ways):
+            for posture in self._postures:
+                self._prefer(posture)
+                if self._can_follow(curves):
+                    return number
         raise SkillError(
             f"The {self._side} arm finds no posture for its way; "
             "move the object nearer to its nominal place."

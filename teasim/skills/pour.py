@@ -49,7 +49,11 @@ class Aim:
     """Shortest time the vessel is held tilted [s]."""
 
 
-WELL_AIMED = Aim()
+WELL_AIMED = (Aim(),)
+BESIDE = tuple(
+    Aim((x, y, 0.0)) for x, y in ((-0.085, 0), (-0.06, 0.06), (-0.06, -0.06), (0.085, 0))
+)
+"""Past the cup, on the side the arm can reach."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +70,13 @@ class Grip:
     """Tip of the spout in the vessel's frame [m]."""
     closing: float = 1.0
     """1 when the hand's closing axis points to the spout, -1 when it points to the handle."""
-    poorly: Aim = Aim(offset=(-0.085, 0.0, 0.0))
-    """How an ineffective pour is aimed."""
+    poorly: tuple[Aim, ...] = BESIDE
+    """How an ineffective pour may be aimed, best first."""
 
 
 KETTLE = Grip("kettle", 0.030, 0.042, (0.062, 0.0, 0.072), -1.0)
 # At a quarter of the tilt the milk still stands below the jug's lip.
-MILK_JUG = Grip("milk_jug", 0.022, 0.026, (0.036, 0.0, 0.062), poorly=Aim(share=0.25, hold=2.0))
+MILK_JUG = Grip("milk_jug", 0.022, 0.026, (0.036, 0.0, 0.062), poorly=(Aim(share=0.25, hold=2.0),))
 SUGAR_POT = Grip("sugar_pot", 0.022, 0.026, (0.034, 0.0, 0.052))
 
 
@@ -89,9 +93,9 @@ def pour(arm: Arm, grip: Grip, manner: Manner) -> Motion:
     home = _vessel_pose(simulation, grip)
     if rotation(home)[2, 2] < np.cos(np.radians(15)):
         raise SkillError(f"The {grip.vessel} does not stand upright; reset the station.")
-    aim = grip.poorly if manner == INEFFECTIVE else WELL_AIMED
     grasp = _grasp(simulation, grip, home)
-    arm.choose_posture(rehearsal(arm, grip, home, grasp, aim))
+    aims = grip.poorly if manner == INEFFECTIVE else WELL_AIMED
+    aim = aims[arm.choose_way([rehearsal(arm, grip, home, grasp, aim) for aim in aims])]
     # From above: the straight way in joint space would sweep the hand through the vessel.
     yield from arm.reach(shifted(arm.before(grasp), DESCENT * UP), grip.opening)
     yield from arm.line(arm.before(grasp))

@@ -5,12 +5,18 @@ import numpy as np
 
 from teasim.constants import ARMS, CONTROL_TIMESTEP, UPDATES_PER_CONTROL
 from teasim.world.embodiments import YUMI, Embodiment
+from teasim.world.state import Saved
 
 BLOCKED_LAG = 0.004
 """A closing finger this far behind its command is held by something [m]."""
 
+_S = (np.arange(UPDATES_PER_CONTROL)[:, None] + 0.5) / UPDATES_PER_CONTROL
+# Hermite cubic with given slopes at both ends, and its derivative (updates, 1).
+_START, _END = _S - 2 * _S**2 + _S**3, 2 * _S**2 - _S**3
+_START_SLOPE, _END_SLOPE = 1 - 4 * _S + 3 * _S**2, 4 * _S - 3 * _S**2
 
-class Controller:
+
+class Controller(Saved):
     """Position control of both arms and grippers.
 
     Within a control step the arms follow a cubic from the last target to the new one whose end
@@ -18,10 +24,12 @@ class Controller:
     and the motors still see a continuous velocity, which they need to carry things without jerks.
     """
 
+    SAVED = ("_position", "_velocity", "_fingers")
+
     def __init__(self, model: mujoco.MjModel, embodiment: Embodiment = YUMI) -> None:
         joints = [name for arm in ARMS for name in embodiment.joints[arm]]
         self._count = len(joints)
-        self._finger_speed = embodiment.finger_speed
+        self._stride = embodiment.finger_speed * CONTROL_TIMESTEP / UPDATES_PER_CONTROL
         self._arm_actuators = np.array([model.actuator(name).id for name in joints])
         self._finger_actuators = np.array([model.actuator(f"{arm}_gripper").id for arm in ARMS])
         self._joint_addresses = np.array([model.joint(name).qposadr[0] for name in joints])
@@ -54,7 +62,7 @@ class Controller:
         segment = _Segment(self, self._position, self._velocity, goal, target[self._count :] / 2)
         self._velocity = (goal - self._position) / CONTROL_TIMESTEP
         self._position = goal
-        opening = segment.fingers > self._fingers
+        opening = target[self._count :] / 2 > self._fingers
         # An opening hand starts from where its fingers are, not from the squeeze far inside.
         present = data.qpos[self._finger_addresses]
         self._fingers = np.where(opening, np.maximum(self._fingers, present), self._fingers)
@@ -73,21 +81,21 @@ class _Segment:
         fingers: np.ndarray,
     ) -> None:
         self._controller = controller
-        self._start, self._rate, self._move = start, velocity * CONTROL_TIMESTEP, goal - start
-        self.fingers = fingers
+        self.fingers = fingers.tolist()
+        rate, move = velocity * CONTROL_TIMESTEP, goal - start
+        position = start + rate * _START + move * _END
+        slope = rate * _START_SLOPE + move * _END_SLOPE
+        lead = controller._feedforward * slope / CONTROL_TIMESTEP
+        self._arms = np.clip(position + lead, *controller._limits.T)  # (updates, 14)
 
     def apply(self, update: int, data: mujoco.MjData) -> None:
         """Write the motor commands of one of the step's updates."""
         control = self._controller
-        s = (update + 0.5) / UPDATES_PER_CONTROL
-        # Hermite cubic with end slopes `rate` and `move`, and its derivative.
-        position = self._start + self._rate * (s - 2 * s**2 + s**3) + self._move * (2 * s**2 - s**3)
-        slope = self._rate * (1 - 4 * s + 3 * s**2) + self._move * (4 * s - 3 * s**2)
-        lead = control._feedforward * slope / CONTROL_TIMESTEP
-        data.ctrl[control._arm_actuators] = np.clip(position + lead, *control._limits.T)
+        data.ctrl[control._arm_actuators] = self._arms[update]
         # Blocked fingers do not move, so nothing keeps the force from building up at once.
-        lag = data.qpos[control._finger_addresses] - control._fingers
-        speed = control._finger_speed * np.where(lag > BLOCKED_LAG, 10, 1)
-        stride = speed * CONTROL_TIMESTEP / UPDATES_PER_CONTROL
-        control._fingers += np.clip(self.fingers - control._fingers, -stride, stride)
+        present = data.qpos[control._finger_addresses].tolist()
+        for finger, (goal, at) in enumerate(zip(self.fingers, present, strict=True)):
+            command = float(control._fingers[finger])
+            stride = control._stride * (10 if at - command > BLOCKED_LAG else 1)
+            control._fingers[finger] = command + min(max(goal - command, -stride), stride)
         data.ctrl[control._finger_actuators] = control._fingers

@@ -1,5 +1,6 @@
 """Sub-tasks recognised from what physically happened, never from what a script meant to do."""
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -7,6 +8,7 @@ import numpy as np
 
 from teasim.constants import ARMS
 from teasim.world.liquids import CUP_FLOOR, RIM_HEIGHT, VESSELS, Liquids
+from teasim.world.state import Saved
 from teasim.world.station import body_name
 
 KNOB_ON = np.radians(60)
@@ -22,6 +24,7 @@ STIR_TURNS = 2.0
 STIR_RADIUS = 0.004
 """Nearer to the cup's axis the direction of the spoon says nothing [m]."""
 
+_NEAR = 2 * math.hypot(BAG_RADIUS, RIM_HEIGHT)  # nothing in the cup is farther from its foot [m]
 _ADDED = {"water": "add_water", "milk": "add_milk", "sugar": "add_sugar"}
 
 
@@ -35,8 +38,10 @@ class Event:
     """When it was completed [s]."""
 
 
-class Recogniser:
+class Recogniser(Saved):
     """Watches knob, cup, bag and spoon, and writes down the sub-tasks that happen."""
+
+    SAVED = ("events", "oven_on", "bag_in_cup", "stirring", "_counted", "_angle", "_turned")
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._knob = model.joint("knob").qposadr[0]
@@ -85,7 +90,7 @@ class Recogniser:
 
     def _watch_bag(self, data: mujoco.MjData) -> None:
         middle = self._in_cup_frame(data.xipos[self._bag], data)
-        inside = np.hypot(*middle[:2]) < BAG_RADIUS and 0 < middle[2] < RIM_HEIGHT
+        inside = math.hypot(*middle[:2]) < BAG_RADIUS and 0 < middle[2] < RIM_HEIGHT
         if not inside:
             self.bag_in_cup = False
         elif not self.bag_in_cup and not self._held(self._bag, data):
@@ -94,10 +99,10 @@ class Recogniser:
 
     def _watch_spoon(self, data: mujoco.MjData, liquids: Liquids) -> None:
         tip = self._in_cup_frame(data.site_xpos[self._tip], data)
-        radius = np.hypot(*tip[:2])
+        radius = math.hypot(*tip[:2])
         dipped = radius < BAG_RADIUS and 0 < tip[2] < CUP_FLOOR + liquids.depth
         before = self._angle
-        self._angle = float(np.arctan2(tip[1], tip[0])) if dipped else None
+        self._angle = math.atan2(tip[1], tip[0]) if dipped else None
         self.stirring = False
         if before is None or self._angle is None:
             self._turned = self._turned if dipped else 0.0
@@ -111,9 +116,16 @@ class Recogniser:
         if earlier < 2 * np.pi * STIR_TURNS <= abs(self._turned):
             self._record("stir", data)
 
-    def _in_cup_frame(self, point: np.ndarray, data: mujoco.MjData) -> np.ndarray:
-        rotation = data.xmat[self._cup].reshape(3, 3)
-        return np.asarray(rotation.T @ (point - data.xpos[self._cup]))
+    def _in_cup_frame(self, point: np.ndarray, data: mujoco.MjData) -> tuple[float, float, float]:
+        """A point's place in the cup [m]; infinitely far if it is not near."""
+        # For three numbers Python is three times as fast as NumPy.
+        px, py, pz = point.tolist()
+        cx, cy, cz = data.xpos[self._cup].tolist()
+        dx, dy, dz = px - cx, py - cy, pz - cz
+        if dx * dx + dy * dy + dz * dz > _NEAR * _NEAR:
+            return math.inf, math.inf, math.inf
+        a, b, c, d, e, f, g, h, i = data.xmat[self._cup].tolist()
+        return a * dx + d * dy + g * dz, b * dx + e * dy + h * dz, c * dx + f * dy + i * dz
 
     def _held(self, body: int, data: mujoco.MjData) -> bool:
         pairs = data.contact.geom

@@ -6,6 +6,7 @@ from functools import cache
 import mujoco
 import numpy as np
 
+from teasim.world.state import Saved
 from teasim.world.station import body_name
 
 FLOW_LIMIT = 40.0
@@ -49,6 +50,7 @@ CONTENTS = tuple(vessel.content for vessel in VESSELS.values())
 _UPRIGHT = np.cos(np.radians(10))
 
 _COLOURS = {"water": (0.62, 0.76, 0.88), "tea": (0.46, 0.19, 0.05), "milk": (0.97, 0.94, 0.87)}
+_PUDDLES = {"water": (0.45, 0.62, 0.78), "milk": (0.95, 0.93, 0.88), "sugar": (0.97, 0.97, 0.97)}
 _STREAMS = {
     "water": (0.45, 0.70, 0.95, 0.9),
     "milk": (0.98, 0.97, 0.92, 1.0),
@@ -85,12 +87,14 @@ def held_volume(vessel: Vessel, tilt: float) -> float:
     return float(np.interp(tilt, tilts, volumes))
 
 
-class Liquids:
+class Liquids(Saved):
     """Amounts in the vessels, in the cup and on the table.
 
     Masses of the bodies stay what they are: the 25 to 100 g that move are within what the grasps
     hold, and changing a body's mass in mid-contact makes light vessels jump.
     """
+
+    SAVED = ("amounts", "cup", "spilled", "spill_place", "tea", "mixed", "streams")
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._vessel_bodies = {name: model.body(body_name(name)).id for name in VESSELS}
@@ -117,7 +121,10 @@ class Liquids:
 
     def update(self, data: mujoco.MjData, dt: float, *, brewing: bool, stirring: bool) -> None:
         """Let everything flow, brew and mix for `dt` seconds."""
-        streams = [self._pour(name, data, dt) for name in VESSELS]
+        # What stands upright is not so full that it would run out.
+        lean = data.xmat[:, 8]
+        tilted = [name for name, body in self._vessel_bodies.items() if lean[body] <= _UPRIGHT]
+        streams = [self._pour(name, data, dt) for name in tilted]
         self.streams = tuple(stream for stream in streams if stream is not None)
         if brewing and self.cup["water"] > 0:
             self.tea += (1 - self.tea) * dt / (STIR_TIME if stirring else BREW_TIME)
@@ -127,8 +134,6 @@ class Liquids:
     def _pour(self, name: str, data: mujoco.MjData, dt: float) -> Stream | None:
         vessel = VESSELS[name]
         rotation = data.xmat[self._vessel_bodies[name]].reshape(3, 3)
-        if rotation[2, 2] > _UPRIGHT:
-            return None  # nothing stands so high in its vessel that it would run out already
         tilt = float(np.arccos(max(rotation[2, 2], -1.0)))
         above_lip = self.amounts[name] - held_volume(vessel, tilt)
         if above_lip <= 1e-9:
@@ -172,16 +177,23 @@ class Liquids:
             content.pos[2] = 0.0035 + level
             content.rgba[3] = 1.0 if self.amounts[name] > 1 else 0.0
         self._paint_cup(model)
-        spill = model.geom("spill")
-        amount = sum(self.spilled.values())
-        spill.pos[:2] = self.spill_place
-        spill.size[0] = np.sqrt(max(amount, 0.01) * 1e-6 / (np.pi * 0.001))  # a film of 1 mm
-        spill.rgba[3] = 0.8 if amount > 1 else 0.0
+        self._paint_spill(model)
         # Where a shape is in the world is otherwise only found out by the next physics step.
         for geom in self._painted:
             body = model.geom_bodyid[geom]
             offset = data.xmat[body].reshape(3, 3) @ model.geom_pos[geom]
             data.geom_xpos[geom] = data.xpos[body] + offset
+
+    def _paint_spill(self, model: mujoco.MjModel) -> None:
+        spill = model.geom("spill")
+        amounts = np.array(list(self.spilled.values()))
+        amount = amounts.sum()
+        thickness = 0.001 + 0.004 * self.spilled["sugar"] / max(amount, 1.0)  # sugar heaps up
+        spill.pos[:2] = self.spill_place
+        spill.size[0] = np.sqrt(max(amount, 0.01) * 1e-6 / (np.pi * thickness))
+        colours = np.array([_PUDDLES[content] for content in self.spilled])
+        spill.rgba[:3] = amounts @ colours / max(amount, 0.01)
+        spill.rgba[3] = 0.85 if amount > 1 else 0.0
 
     def _paint_cup(self, model: mujoco.MjModel) -> None:
         content, sugar = model.geom("cup/content"), model.geom("cup/sugar")

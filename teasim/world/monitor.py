@@ -62,7 +62,7 @@ class Monitor:
     @property
     def forbidden(self) -> tuple[Pair, ...]:
         """Pairs that touched and must not."""
-        return tuple(pair for pair in sorted(self.touches) if _is_forbidden(pair))
+        return tuple(pair for pair in sorted(self.touches) if is_forbidden(pair))
 
     def _look(self) -> None:
         data = self._simulation.data
@@ -83,7 +83,8 @@ class Monitor:
             self.tcp_speed = max(self.tcp_speed, float(speed))
 
 
-def _is_forbidden(pair: Sequence[str]) -> bool:
+def is_forbidden(pair: Sequence[str]) -> bool:
+    """Whether what has these two roles must not touch."""
     arms = [role for role in pair if role.endswith("_arm")]
     sides = {role.partition("_")[0] for role in pair if role.endswith(("_arm", "_fingers"))}
     return len(sides) > 1 or bool(arms and set(pair) & set(KEEP_OFF))

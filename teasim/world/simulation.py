@@ -16,6 +16,7 @@ from teasim.world.embodiments import find_embodiment
 from teasim.world.events import Event, Recogniser
 from teasim.world.liquids import CONTENTS, VESSELS, Liquids, Stream
 from teasim.world.person import Look, wear
+from teasim.world.state import PhysicsState, SimulationState
 from teasim.world.station import FREE_BODIES, Layout, body_name, place, station_model
 
 SETTLE_TIME = 0.8
@@ -54,7 +55,10 @@ class Simulation:
         self.recogniser = Recogniser(self.model)
         self._controller = Controller(self.model, self.embodiment)
         self._paint_body = self.embodiment.painter(self.model)
+        free = [self.model.joint(body_name(name)).qposadr[0] for name in FREE_BODIES]
         self._knob = self.model.joint("knob").qposadr[0]
+        self._knob_body = self.model.body("knob").id
+        self._poses = (np.array(free)[:, None] + np.arange(7)).ravel()
         self._glow = [self.model.geom("plate").id, self.model.geom("pilot").id]
         self.target = np.zeros(2 * self.embodiment.width + 2)
         self.observers: list[Callable[[], None]] = []
@@ -87,8 +91,8 @@ class Simulation:
 
         The shape of `target` is (16,) for YuMi, (2 n + 2,) for a body with n joints per arm.
         """
-        segment = self._controller.commands(target, self.data)
         self.target = np.array(target, dtype=float)
+        segment = self._controller.commands(self.target, self.data)
         for update in range(UPDATES_PER_CONTROL):
             segment.apply(update, self.data)
             mujoco.mj_step(self.model, self.data, nstep=STEPS_PER_UPDATE)
@@ -101,6 +105,28 @@ class Simulation:
             )
             for observer in self.observers:
                 observer()
+
+    def get_state(self) -> SimulationState:
+        """Everything the station's future depends on, apart from the targets to come."""
+        return SimulationState(
+            PhysicsState.of(self.model, self.data),
+            self.target.copy(),
+            self._controller.state(),
+            self.liquids.state(),
+            self.recogniser.state(),
+        )
+
+    def set_state(self, state: SimulationState) -> None:
+        """Go back to `state`: the same targets then give the same bits as they gave from there.
+
+        Raises:
+            ConfigError: the state was taken from another kind of station.
+        """
+        state.physics.restore(self.model, self.data)
+        self.target = state.target.copy()
+        self._controller.restore(state.controller)
+        self.liquids.restore(state.liquids)
+        self.recogniser.restore(state.recogniser)
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -128,11 +154,11 @@ class Simulation:
 
     def environment_state(self) -> np.ndarray:
         """Everything but the robot, as named by `ENVIRONMENT_STATE_NAMES` (n,) float32."""
-        poses = [self.data.joint(body_name(name)).qpos for name in FREE_BODIES]
-        knob = [*self.model.body("knob").pos[:2], self.data.qpos[self._knob]]
+        place = self.model.body_pos[self._knob_body].tolist()
         liquids = self.liquids
         amounts = [*liquids.amounts.values(), *liquids.cup.values(), liquids.tea, liquids.mixed]
-        return np.concatenate([*poses, knob, amounts]).astype(np.float32)
+        rest = [*place[:2], self.data.qpos[self._knob], *amounts]
+        return np.concatenate([self.data.qpos[self._poses], rest]).astype(np.float32)
 
     def paint(self) -> None:
         """Bring what can be seen up to date: levels, colours, limbs, and the glow of the hob."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from teasim.constants import PHYSICS_TIMESTEP, assets_folder
 from teasim.world.embodiments import find_embodiment
+from teasim.world.grain import add_grain
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,7 @@ def station_spec(embodiment: str = "yumi") -> mujoco.MjSpec:
     """
     folder = assets_folder()
     spec = mujoco.MjSpec.from_file(str(folder / "tea_station" / "scene.xml"))
+    add_grain(spec)
     find_embodiment(embodiment).mount(spec)
     layout = nominal_layout()
     for name in (*FREE_BODIES, *_FIXED_BODIES[1:]):

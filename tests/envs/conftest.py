@@ -1,4 +1,4 @@
-"""Environments that are closed after the test."""
+"""Environments that are closed after the test, and skills that only wait."""
 
 import gymnasium
 import pytest
@@ -15,3 +15,12 @@ def make():
     yield build
     for env in made:
         env.close()
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Skills that only wait: for tests that try many actions and look at everything but physics."""
+    monkeypatch.setattr(
+        "teasim.envs.subtask_env.run_subtask",
+        lambda simulation, *_: simulation.step(simulation.target),
+    )

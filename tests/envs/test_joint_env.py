@@ -5,19 +5,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.constants import GRIPPER_OPEN, GRIPPER_SQUEEZE
+from teasim.constants import GRIPPER_OPEN, GRIPPER_SQUEEZE, STATE_NAMES
+from teasim.envs.actions import DELTA_SHARE
 from teasim.envs.joint_env import TeaMakingEnv
-from teasim.skills.arm import Style
-from teasim.skills.library import perform
-from teasim.world.simulation import Simulation
-from teasim.world.station import sample_layout
+from teasim.world.yumi import JOINT_SPEEDS
 
 ENV = TeaMakingEnv()
+DELTA = TeaMakingEnv(control="delta")
+for env in (ENV, DELTA):
+    env.reset(seed=0)
 
 
 @given(st.lists(st.floats(-1, 1, width=32), min_size=16, max_size=16))
 def test_actions_and_targets_are_two_ways_to_say_the_same(values):
     action = np.array(values, dtype=np.float32)
+    assert DELTA.action(DELTA.target(action.astype(np.float64))) == pytest.approx(action, abs=1e-6)
     assert ENV.action(ENV.target(action.astype(np.float64))) == pytest.approx(action, abs=1e-6)
 
 
@@ -33,28 +35,28 @@ def test_actions_span_the_joints_ranges_and_the_grippers():
     assert ENV.target(np.full(16, 9.0)) == pytest.approx(high)
 
 
-@pytest.mark.parametrize("subtask", ["turn_on_oven", "add_tea_bag"])
-def test_replaying_a_skills_log_does_the_sub_task_again(make, subtask):
-    env = make("TeaMaking")
-    env.reset(seed=4)
-    simulation = Simulation()
-    simulation.reset(sample_layout(np.random.Generator(np.random.PCG64(4))))
-    rewards, done = [], ()
-    for target in perform(subtask, simulation, Style()):
-        simulation.step(target)
-        observation, reward, terminated, _, info = env.step(env.unwrapped.action(target))
-        rewards.append(reward)
-        assert info["subtasks_done"] == simulation.subtasks_done
-    done = simulation.subtasks_done
-    assert done == (subtask,)
-    assert sum(rewards) == pytest.approx(1 / 7)
-    assert rewards.count(0.0) == len(rewards) - 1
-    assert not terminated
-    # The log is float32, so it is the same motion and not the same bits.
-    assert observation["agent_pos"] == pytest.approx(simulation.joint_state(), abs=1e-3)
-    assert observation["environment_state"] == pytest.approx(
-        simulation.environment_state(), abs=0.01
-    )
+def test_a_full_delta_is_a_share_of_what_the_joints_largest_speed_covers(make):
+    env = make("TeaMaking", control="delta")
+    env.reset(seed=0)
+    last = env.unwrapped._simulation.target.copy()
+    full = np.r_[np.full(14, -1.0), 1.0, -1.0]
+    expected = last[:14] - 0.1 * DELTA_SHARE * np.tile(JOINT_SPEEDS, 2)
+    low = [env.unwrapped._simulation.model.joint(name).range[0] for name in STATE_NAMES[:14]]
+    for _ in range(2):
+        target = env.unwrapped.target(full)
+        assert target[:14] == pytest.approx(np.maximum(expected, low))
+        assert target[14:] == pytest.approx([GRIPPER_OPEN, GRIPPER_SQUEEZE])
+        env.step(full)
+        assert env.unwrapped._simulation.target == pytest.approx(target)
+        expected = target[:14] - 0.1 * DELTA_SHARE * np.tile(JOINT_SPEEDS, 2)
+
+
+def test_a_delta_of_nothing_is_holding_still(make):
+    env = make("TeaMaking", control="delta")
+    env.reset(seed=0)
+    last = env.unwrapped._simulation.target.copy()
+    env.step(env.unwrapped.action(last))
+    assert (env.unwrapped._simulation.target[:14] == last[:14]).all()
 
 
 def test_an_episode_ends_after_three_minutes(make):

@@ -1,8 +1,12 @@
 """Whole sub-tasks as actions."""
 
+import pickle
+
+import numpy as np
 import pytest
 
 from teasim.constants import SUBTASKS
+from teasim.errors import ConfigError
 from teasim.task.recipes import SEQ_1
 
 TURN_ON, ADD_WATER, _, _, ADD_TEA_BAG, STIR, TURN_OFF = range(7)
@@ -53,6 +57,7 @@ def test_a_break_of_the_precedence_is_written_down_and_the_oven_is_unsafe(make):
     assert STIR not in info["allowed_actions"]
 
 
+@pytest.mark.usefixtures("quick")
 def test_the_number_of_actions_is_limited(make):
     env = make("TeaMakingSubtasks", max_actions=2)
     for _ in range(2):
@@ -68,3 +73,39 @@ def test_the_robot_is_at_ready_and_at_rest_at_every_decision(make):
     start, _ = env.reset(seed=0)
     later, *_ = env.step(TURN_ON)
     assert later["agent_pos"][:14] == pytest.approx(start["agent_pos"][:14], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("action", "word"),
+    [
+        (7, "7"),
+        (-1, "-1"),
+        (np.int64(9), "np.int64(9)"),
+        (np.nan, "nan"),
+        (2.5, "2.5"),
+        ("stir", "'stir'"),
+    ],
+)
+def test_what_is_no_sub_task_is_refused_and_harms_nothing(make, action, word):
+    env = make("TeaMakingSubtasks")
+    env.reset(seed=0)
+    before = pickle.dumps(env.unwrapped.get_state())
+    with pytest.raises(ConfigError) as error:
+        env.step(action)
+    assert str(error.value) == f"Unknown action {word}; choose a number from 0 to 6."
+    assert pickle.dumps(env.unwrapped.get_state()) == before
+
+
+def test_a_skill_goes_on_from_a_state_bit_for_bit(make):
+    env = make("TeaMakingSubtasks", max_actions=2).unwrapped
+    env.reset(seed=1)
+    env.step(ADD_TEA_BAG)
+    state = env.get_state()
+    first = env.step(TURN_ON)
+    env.reset(seed=2)
+    env.set_state(pickle.loads(pickle.dumps(state)))
+    second = env.step(TURN_ON)
+    for key, values in first[0].items():
+        assert values.tobytes() == second[0][key].tobytes()
+    assert first[1:] == second[1:]
+    assert first[3]  # the action before it was counted, too

@@ -8,6 +8,7 @@ import pytest
 
 from teasim.constants import ARMS, CONTROL_TIMESTEP, GRIPPER_OPEN, GRIPPER_SQUEEZE, STATE_NAMES
 from teasim.world.control import Controller
+from teasim.world.monitor import PENETRATION_LIMIT
 from teasim.world.station import station_model
 from teasim.world.yumi import FINGER_SPEED, READY
 
@@ -99,8 +100,10 @@ def test_fingers_keep_their_speed_limit(simulation, arm, start, end):
 def test_a_squeeze_of_nothing_presses_with_20_newtons_a_finger_and_closes(simulation):
     hand = STATE_NAMES.index("left_gripper")
     drive(simulation, hand, GRIPPER_SQUEEZE, seconds=2.0)
-    assert simulation.data.actuator("left_gripper").force[0] == pytest.approx(-40, abs=2)
-    assert simulation.joint_state()[hand] == pytest.approx(0, abs=2e-3)
+    assert simulation.data.actuator("left_gripper").force[0] == pytest.approx(
+        -40, abs=3
+    )  # the pads give way a little
+    assert simulation.joint_state()[hand] == pytest.approx(0, abs=PENETRATION_LIMIT)
 
 
 def test_a_squeeze_is_let_go_at_once(simulation):

@@ -1,0 +1,114 @@
+"""The reward of the joint-level environment: named terms, summed with one weight each."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from numbers import Real
+from typing import Any
+
+from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
+from teasim.envs.registration import MAX_SECONDS
+from teasim.errors import ConfigError
+from teasim.task.scoring import Verdict
+from teasim.world.collisions import CollisionCounter
+from teasim.world.simulation import Simulation
+from teasim.world.state import Saved
+
+OVEN_SECONDS = 60.0
+"""The oven may be on for this long; making tea in the best order takes it for about 40 s [s]."""
+
+
+@dataclass(frozen=True)
+class RewardWeights:
+    """What each term of the reward counts."""
+
+    subtasks: float = 1.0
+    """Of the share of the sub-tasks that were completed for the first time."""
+    success: float = 1.0
+    """Of reaching the goal."""
+    spill: float = 0.001
+    """Of a ml or g on the table."""
+    collision: float = 0.01
+    """Of an arm or a hand beginning to touch what it must not."""
+    unsafe: float = 0.1
+    """Of a whole episode with the oven on for too long."""
+
+    def __post_init__(self) -> None:
+        for name, weight in asdict(self).items():
+            number = isinstance(weight, Real) and not isinstance(weight, bool)
+            if not number or not math.isfinite(weight):
+                raise ConfigError(f"The reward weight of '{name}' is {weight}; give a number.")
+
+    @classmethod
+    def of(cls, given: Mapping[str, float] | None) -> "RewardWeights":
+        """The default weights with those of `given` in their place.
+
+        Raises:
+            ConfigError: there is no term of that name, or a weight is not a finite number.
+        """
+        names = [field.name for field in fields(cls)]
+        for name in given or {}:
+            if name not in names:
+                raise ConfigError(f"Unknown reward term '{name}'; choose {', '.join(names)}.")
+        return cls(**(given or {}))
+
+    def total(self, terms: Mapping[str, float]) -> float:
+        """The reward: the weighted sum of the terms."""
+        return float(sum(getattr(self, name) * term for name, term in terms.items()))
+
+
+class RewardTerms(Saved):
+    """What happened since the last look, as one number per term; what is bad is negative.
+
+    * `subtasks`: share of the seven that were completed for the first time; at most 1 in all.
+    * `success`: 1 when the goal is reached.
+    * `spill`: minus what came to lie on the table [ml or g]; at least -175 in all.
+    * `collision`: minus the forbidden contacts that began.
+    * `unsafe`: minus the time for which the oven was on beyond `OVEN_SECONDS`, as a share of the
+      longest episode; above -1 in all.
+    """
+
+    SAVED = ("_counted", "_spilled")
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._collisions = CollisionCounter(simulation)
+        self.reset()
+
+    def reset(self) -> None:
+        """Start a new episode, after the station came to rest."""
+        self._collisions.reset()
+        self._counted = 0
+        self._spilled = sum(self._simulation.liquids.spilled.values())
+
+    def state(self) -> dict[str, Any]:
+        """As of every part, with the contacts."""
+        return super().state() | {"collisions": self._collisions.state()}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go back to what `state()` gave."""
+        super().restore(state)
+        self._collisions.restore(state["collisions"])
+
+    def take(self, verdict: Verdict) -> dict[str, float]:
+        """Terms of what happened since the last call; `verdict` is the one of now."""
+        counted, spilled = self._counted, self._spilled
+        self._counted = len(set(self._simulation.subtasks_done))
+        self._spilled = sum(self._simulation.liquids.spilled.values())
+        collisions, self._collisions.begun = self._collisions.begun, 0
+        return {
+            "subtasks": (self._counted - counted) / len(SUBTASKS),
+            "success": float(verdict.success),
+            "spill": float(spilled - self._spilled),
+            "collision": float(-collisions),
+            "unsafe": (0.0 - self._overtime()) / MAX_SECONDS,
+        }
+
+    def _overtime(self) -> float:
+        """How much of the last control step the oven was on for longer than it may be [s]."""
+        if not self._simulation.oven_on:
+            return 0.0
+        events = self._simulation.events
+        begun = max(event.time for event in events if event.subtask == "turn_on_oven")
+        beyond = float(self._simulation.data.time) - begun - OVEN_SECONDS
+        return min(max(beyond, 0.0), CONTROL_TIMESTEP)
