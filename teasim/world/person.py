@@ -173,9 +173,8 @@ def elbow_of(arm: str, shoulder: np.ndarray, wrist: np.ndarray, pointing: np.nda
 
 
 def _lay(data: mujoco.MjData, geom: int, start: np.ndarray, end: np.ndarray) -> None:
-    """Put a shape in the middle between two places, its z axis along them, its x axis level."""
-    z = (end - start) / np.linalg.norm(end - start)
-    x = np.cross(z, (1.0, 0.0, 0.0))
-    x = x / max(float(np.linalg.norm(x)), 1e-6)
+    """Put a shape in the middle between two places, turned the shortest way to lie along them."""
+    turn = np.zeros(4)
+    mujoco.mju_quatZ2Vec(turn, end - start)
+    mujoco.mju_quat2Mat(data.geom_xmat[geom], turn)
     data.geom_xpos[geom] = (start + end) / 2
-    data.geom_xmat[geom] = np.column_stack([x, np.cross(z, x), z]).flatten()
