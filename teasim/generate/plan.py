@@ -45,8 +45,9 @@ def plan_pool(config: GenerateConfig) -> tuple[DemoPlan, ...]:
         plans.append((LEGAL, _recipe(_own_order(who, rng), config, rng)))
     order = rng.permutation(len(plans))
     # They take turns kind by kind, so that nobody makes all the mistakes.
+    names = [team[which % len(team)].name for which in order]
     return tuple(
-        DemoPlan(index, *plans[which], participant=team[which % len(team)].name)
+        DemoPlan(index, plans[which][0], plans[which][1], names[index])
         for index, which in enumerate(order)
     )
 
