@@ -14,6 +14,7 @@ from teasim.errors import ConfigError
 from teasim.render import StationRenderer, check_cameras, check_look
 from teasim.task.recipes import allowed_next, next_correct
 from teasim.task.scoring import Verdict, judge
+from teasim.world.looks import Look, check_look_kind, fixed_look, sample_look
 from teasim.world.simulation import Simulation
 from teasim.world.state import SimulationState
 from teasim.world.station import nominal_layout, sample_layout
@@ -32,6 +33,8 @@ class EnvState:
     """The station."""
     random: Mapping[str, Any]
     """State of the generator that the next resets draw from."""
+    look: Look
+    """How the station looks."""
     progress: Any
     """What the environment itself counts."""
 
@@ -50,6 +53,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         render_mode: str | None = None,
         quality: str = "fast",
         randomize: bool = True,
+        look: str = "fixed",
     ) -> None:
         """Build the station; OpenGL starts with the first picture.
 
@@ -61,6 +65,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
             render_mode: None or rgb_array.
             quality: Look of the pictures, fast or nice.
             randomize: Move and turn the things on the table at every reset.
+            look: fixed, or random: light, colours, cameras and things around change at every reset.
 
         Raises:
             ConfigError: an argument is unknown or out of range.
@@ -73,6 +78,8 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         self._size = (height, width)
         self._quality = quality
         self._randomize = randomize
+        self._look_kind = check_look_kind(look)
+        self._look = fixed_look()
         self.observation_space = observation_space(obs_type, self._cameras, height, width)
         self._simulation = Simulation()
         self._renderer: StationRenderer | None = None
@@ -88,6 +95,8 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         randomize = (options or {}).get("randomize", self._randomize)
         layout = sample_layout(self.np_random) if randomize else nominal_layout()
         self._simulation.reset(layout)
+        if self._look_kind == "random":  # else nothing is drawn: seeds keep their layouts
+            self._wear(sample_look(self.np_random))
         return self._observation(), self._info(self._verdict())
 
     def render(self) -> Any:
@@ -95,6 +104,14 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         if self.render_mode is None:
             return None
         return self._pictures().frames(self._cameras[:1])[self._cameras[0]]
+
+    def masks(self) -> dict[str, np.ndarray]:
+        """What every pixel of every camera shows: (height, width) int32 of `SEGMENT_NAMES`."""
+        return self._pictures().masks(self._cameras)
+
+    def depths(self) -> dict[str, np.ndarray]:
+        """Distance along the axis of every camera: (height, width) float32 [m]."""
+        return self._pictures().depths(self._cameras)
 
     def close(self) -> None:
         """Close OpenGL."""
@@ -111,6 +128,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
             type(self).__name__,
             self._simulation.get_state(),
             copy.deepcopy(self.np_random.bit_generator.state),
+            self._look,
             self._progress(),
         )
 
@@ -124,6 +142,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
             raise ConfigError(f"The state is of {state.env}; this is {type(self).__name__}.")
         self._simulation.set_state(state.simulation)
         self.np_random.bit_generator.state = copy.deepcopy(dict(state.random))
+        self._wear(state.look)
         self._set_progress(state.progress)
 
     def _progress(self) -> Any:
@@ -138,9 +157,18 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         if self._renderer is None:
             height, width = self._size
             self._renderer = StationRenderer(
-                self._simulation, width=width, height=height, quality=self._quality
+                self._simulation,
+                width=width,
+                height=height,
+                quality=self._quality,
+                look=self._look,
             )
         return self._renderer
+
+    def _wear(self, look: Look) -> None:
+        self._look = look
+        if self._renderer is not None:
+            self._renderer.wear(look)
 
     def _observation(self) -> dict[str, Any]:
         seeing = "pixels" in self.observation_space.spaces  # type: ignore[attr-defined]

@@ -32,6 +32,7 @@ class TeaMakingSubtasksEnv(StationEnv):
         render_mode: str | None = None,
         quality: str = "fast",
         randomize: bool = True,
+        look: str = "fixed",
         max_actions: int = 14,
     ) -> None:
         """As `StationEnv`; the episode is cut off after `max_actions` actions.
@@ -39,7 +40,7 @@ class TeaMakingSubtasksEnv(StationEnv):
         Raises:
             ConfigError: an argument is unknown or out of range.
         """
-        super().__init__(obs_type, cameras, width, height, render_mode, quality, randomize)
+        super().__init__(obs_type, cameras, width, height, render_mode, quality, randomize, look)
         if max_actions < 1:
             raise ConfigError(f"max_actions is {max_actions}; choose 1 or more.")
         self.action_space = spaces.Discrete(len(SUBTASKS))

@@ -9,12 +9,11 @@ from teasim.render import check_cameras, check_look
 from teasim.skills.demonstrators import PARTICIPANTS, Participant
 from teasim.task.mistakes import Plan, spoil
 from teasim.task.recipes import SEQ_1
-from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.embodiments import find_embodiment
+from teasim.world.looks import check_look_kind
 
 SIZES = (32, 1024)
 """Smallest and largest side of a video [pixels]."""
-LOOKS = ("fixed", "random")
-"""How the pictures of a pool vary."""
 OPTIONAL = ("add_sugar", "add_milk")
 """Ingredients that tea can do without, when a pool says so."""
 
@@ -97,12 +96,8 @@ class GenerateConfig:
             raise ConfigError("The pool would be empty; ask for demonstrations with --seq1 N.")
 
     def _check_who(self) -> None:
-        for name, value, choices in (
-            ("embodiment", self.embodiment, tuple(EMBODIMENTS)),
-            ("look", self.look, LOOKS),
-        ):
-            if value not in choices:
-                raise ConfigError(f"Unknown {name} '{value}'; choose {', '.join(choices)}.")
+        find_embodiment(self.embodiment)
+        check_look_kind(self.look)
         most = sum(one.embodiment == "person" for one in PARTICIPANTS.values())
         if not 1 <= self.participants <= most:
             raise ConfigError(

@@ -18,7 +18,7 @@ from teasim.skills.demonstrators import PARTICIPANTS
 from teasim.task.mistakes import PlannedMistake
 from teasim.task.scoring import Verdict, judge, spills
 from teasim.world.liquids import VESSELS
-from teasim.world.looks import fixed_look, sample_look
+from teasim.world.looks import draw_look
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 
 ATTEMPTS = 6
@@ -95,9 +95,12 @@ def _record(
 def _camera(simulation: Simulation, config: GenerateConfig, demo: DemoPlan) -> StationRenderer:
     # Its own randomness: a pool in another look holds the same demonstrations.
     rng = np.random.default_rng([config.seed, 2, demo.index])
-    look = sample_look(rng) if config.look == "random" else fixed_look()
     return StationRenderer(
-        simulation, width=config.size, height=config.size, quality=config.quality, look=look
+        simulation,
+        width=config.size,
+        height=config.size,
+        quality=config.quality,
+        look=draw_look(config.look, rng),
     )
 
 

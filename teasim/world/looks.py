@@ -15,6 +15,8 @@ from teasim.errors import ConfigError
 Colour = tuple[float, float, float]
 """Red, green and blue, 0 to 1."""
 
+LOOKS = ("fixed", "random")
+"""How the pictures of several demonstrations vary."""
 LIGHT_BRIGHTNESS = (0.6, 1.1)
 """The lamp shines this many times as brightly as in the fixed look."""
 LIGHT_AMBIENT = (0.75, 1.05)
@@ -236,6 +238,26 @@ class Look:
 def fixed_look() -> Look:
     """Return the look of the scene as it is."""
     return Look()
+
+
+def draw_look(kind: str, rng: np.random.Generator) -> Look:
+    """Return the fixed look, or a random one.
+
+    Raises:
+        ConfigError: `kind` is not one of `LOOKS`.
+    """
+    return sample_look(rng) if check_look_kind(kind) == "random" else fixed_look()
+
+
+def check_look_kind(kind: str) -> str:
+    """Return `kind`.
+
+    Raises:
+        ConfigError: it is not one of `LOOKS`.
+    """
+    if kind not in LOOKS:
+        raise ConfigError(f"Unknown look '{kind}'; choose {', '.join(LOOKS)}.")
+    return kind
 
 
 def sample_look(rng: np.random.Generator) -> Look:

@@ -14,7 +14,7 @@ from teasim.world.person import (
     SHOULDERS,
     UPPER_ARM,
     WRIST,
-    Look,
+    Appearance,
     elbow_of,
     lean_towards,
 )
@@ -147,7 +147,7 @@ def test_looking_changes_nothing(person):
 
 
 def test_clothes_are_those_of_one_simulation(person):
-    person.dress(Look((0.5, 0.4, 0.3), (0.1, 0.2, 0.3), (0.9, 0.8, 0.7)))
+    person.dress(Appearance((0.5, 0.4, 0.3), (0.1, 0.2, 0.3), (0.9, 0.8, 0.7)))
     assert person.model.mat("right_skin").rgba[:3] == pytest.approx((0.5, 0.4, 0.3))
     assert person.model.mat("left_skin").rgba[:3] == pytest.approx((0.5, 0.4, 0.3))
     assert person.model.mat("person_sleeve").rgba[:3] == pytest.approx((0.1, 0.2, 0.3))
