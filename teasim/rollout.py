@@ -74,8 +74,8 @@ def _take_place(simulation: Simulation, participant: Participant) -> None:
             f"{participant.name} works with the embodiment '{participant.embodiment}', "
             f"the station has '{simulation.embodiment.name}'; choose one for both."
         )
-    if participant.look is not None:
-        simulation.dress(participant.look)
+    if participant.appearance is not None:
+        simulation.dress(participant.appearance)
 
 
 def _rest(simulation: Simulation, subtask: str, position: int, seconds: float) -> Iterator[Step]:

@@ -11,7 +11,7 @@ from teasim.errors import ConfigError
 from teasim.skills.arm import Style
 from teasim.task.recipes import SEQ_1, is_legal
 from teasim.world.embodiments import EMBODIMENTS
-from teasim.world.person import Look
+from teasim.world.person import Appearance
 
 Range = tuple[float, float]
 
@@ -34,7 +34,7 @@ class Participant:
     """Rest before each sub-task [s]."""
     stir_turns: Range
     """Turns of the spoon in the cup."""
-    look: Look | None = None
+    appearance: Appearance | None = None
     """Colours of skin and clothes; None for a body that has neither."""
     hand: str | None = None
     """The hand that takes the tea bag and the spoon; None when there is no choice."""
@@ -110,7 +110,7 @@ _PEOPLE = (
     Participant(
         "person_1",
         embodiment="person",
-        look=Look((0.87, 0.66, 0.54), (0.24, 0.35, 0.56), (0.24, 0.35, 0.56)),
+        appearance=Appearance((0.87, 0.66, 0.54), (0.24, 0.35, 0.56), (0.24, 0.35, 0.56)),
         tempo=(1.8, 2.1),
         lift=(0.070, 0.090),
         bow=(-0.06, 0.06),
@@ -124,7 +124,7 @@ _PEOPLE = (
     Participant(
         "person_2",
         embodiment="person",
-        look=Look((0.47, 0.31, 0.22), (0.80, 0.78, 0.72), (0.62, 0.20, 0.22)),
+        appearance=Appearance((0.47, 0.31, 0.22), (0.80, 0.78, 0.72), (0.62, 0.20, 0.22)),
         tempo=(1.95, 2.3),
         lift=(0.085, 0.105),
         bow=(0.0, 0.09),
@@ -138,7 +138,7 @@ _PEOPLE = (
     Participant(
         "person_3",
         embodiment="person",
-        look=Look((0.95, 0.78, 0.68), (0.22, 0.42, 0.30), (0.20, 0.22, 0.24)),
+        appearance=Appearance((0.95, 0.78, 0.68), (0.22, 0.42, 0.30), (0.20, 0.22, 0.24)),
         tempo=(1.55, 1.8),
         lift=(0.065, 0.080),
         bow=(-0.09, 0.0),

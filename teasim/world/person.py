@@ -64,7 +64,7 @@ _LONGEST = 0.96 * (UPPER_ARM + FOREARM)  # the person leans forward before an ar
 
 
 @dataclass(frozen=True)
-class Look:
+class Appearance:
     """Colours of a person, red green blue in [0, 1]."""
 
     skin: tuple[float, float, float]
@@ -77,12 +77,12 @@ class Look:
     """Hair."""
 
 
-def wear(model: mujoco.MjModel, look: Look) -> None:
-    """Give the person in `model` the colours of `look`."""
+def wear(model: mujoco.MjModel, appearance: Appearance) -> None:
+    """Give the person in `model` the colours of `appearance`."""
     for arm in ARMS:
-        model.mat(f"{arm}_skin").rgba[:3] = look.skin
+        model.mat(f"{arm}_skin").rgba[:3] = appearance.skin
     for part in ("skin", "sleeve", "shirt", "hair"):
-        model.mat(f"person_{part}").rgba[:3] = getattr(look, part)
+        model.mat(f"person_{part}").rgba[:3] = getattr(appearance, part)
 
 
 def hand_spec(arm: str) -> mujoco.MjSpec:

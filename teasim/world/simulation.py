@@ -15,7 +15,7 @@ from teasim.world.control import Controller
 from teasim.world.embodiments import find_embodiment
 from teasim.world.events import Event, Recogniser
 from teasim.world.liquids import CONTENTS, VESSELS, Liquids, Stream
-from teasim.world.person import Look, wear
+from teasim.world.person import Appearance, wear
 from teasim.world.state import PhysicsState, SimulationState
 from teasim.world.station import FREE_BODIES, Layout, body_name, place, station_model
 
@@ -82,9 +82,9 @@ class Simulation:
         self.recogniser.reset()
         self.data.time = 0.0
 
-    def dress(self, look: Look) -> None:
-        """Give the person at the station the colours of `look`."""
-        wear(self.model, look)
+    def dress(self, appearance: Appearance) -> None:
+        """Give the person at the station the colours of `appearance`."""
+        wear(self.model, appearance)
 
     def step(self, target: np.ndarray) -> None:
         """Advance one control step towards `target`: joint angles [rad], openings [m].

@@ -46,7 +46,7 @@ def test_hesitating_is_as_rare_as_stated(name):
 
 def test_people_can_be_told_apart():
     for one, other in combinations(PEOPLE, 2):
-        first, second = PARTICIPANTS[one].look, PARTICIPANTS[other].look
+        first, second = PARTICIPANTS[one].appearance, PARTICIPANTS[other].appearance
         for part in ("skin", "sleeve", "shirt"):
             difference = np.subtract(getattr(first, part), getattr(second, part))
             assert np.linalg.norm(difference) > 0.1, (one, other, part)

@@ -14,7 +14,7 @@ from teasim.world.person import (
     SHOULDERS,
     UPPER_ARM,
     WRIST,
-    Look,
+    Appearance,
     elbow_of,
     lean_towards,
 )
@@ -66,9 +66,10 @@ def test_every_shape_of_a_person_has_a_role():
 
 
 def test_only_hands_collide():
-    for geom, role in enumerate(roles(MODEL)):
-        if role == "torso":
-            assert MODEL.geom_contype[geom] == MODEL.geom_conaffinity[geom] == 0
+    drawn_only = [g for g in range(MODEL.ngeom) if MODEL.geom(g).name.startswith("person_")]
+    assert {roles(MODEL)[geom] for geom in drawn_only} == {"right_arm", "left_arm", "torso"}
+    for geom in drawn_only:
+        assert MODEL.geom_contype[geom] == MODEL.geom_conaffinity[geom] == 0
 
 
 @pytest.mark.parametrize("arm", ARMS)
@@ -147,7 +148,7 @@ def test_looking_changes_nothing(person):
 
 
 def test_clothes_are_those_of_one_simulation(person):
-    person.dress(Look((0.5, 0.4, 0.3), (0.1, 0.2, 0.3), (0.9, 0.8, 0.7)))
+    person.dress(Appearance((0.5, 0.4, 0.3), (0.1, 0.2, 0.3), (0.9, 0.8, 0.7)))
     assert person.model.mat("right_skin").rgba[:3] == pytest.approx((0.5, 0.4, 0.3))
     assert person.model.mat("left_skin").rgba[:3] == pytest.approx((0.5, 0.4, 0.3))
     assert person.model.mat("person_sleeve").rgba[:3] == pytest.approx((0.1, 0.2, 0.3))
