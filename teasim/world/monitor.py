@@ -30,7 +30,8 @@ def _role(model: mujoco.MjModel, geom: int) -> str:
     if side in ARMS:
         return f"{side}_fingers" if "finger" in body else f"{side}_arm"
     if side in EMBODIMENTS:
-        return "torso"
+        limb = name.removeprefix(f"{side}_").partition("_")[0]
+        return f"{limb}_arm" if limb in ARMS else "torso"
     return str(name if body == "world" else body.partition("/")[0])
 
 
