@@ -1,0 +1,56 @@
+"""Make length-matched pools with every kind of mistake and tell what gives the mistakes away.
+
+Exit code 1 when a clue's AUROC, averaged over the pools, is further than 0.1 from 0.5.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from teasim.generate import GenerateConfig, generate
+from teasim.parallel import default_jobs
+from teasim.pool import Pool
+from teasim.pool.leakage import CLUES, leakage
+from teasim.task.mistakes import MISTAKES
+
+TOLERANCE = 0.1
+"""Largest distance of a mean AUROC from 0.5."""
+
+
+def main() -> int:
+    """Run the check."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="where the pools are kept between runs")
+    parser.add_argument("--pools", type=int, default=20, help="number of pools; seeds 0, 1, ...")
+    parser.add_argument("--correct", type=int, default=10, help="correct demonstrations in each")
+    parser.add_argument("--each", type=int, default=1, help="of every kind of mistake in each")
+    parser.add_argument("--size", type=int, default=224, help="side of the videos [pixels]")
+    parser.add_argument("--jobs", type=int, default=default_jobs(), help="processes")
+    arguments = parser.parse_args()
+    found = [leakage(_pool(arguments, seed)) for seed in range(arguments.pools)]
+    table = {clue: np.array([values[clue] for values in found]) for clue in CLUES}
+    print(f"AUROC over {arguments.pools} pools, incorrect against correct: mean, then spread")
+    for clue, values in table.items():
+        print(f"  {clue:20}{values.mean():.3f}  {values.std():.3f}")
+    return int(any(abs(values.mean() - 0.5) > TOLERANCE for values in table.values()))
+
+
+def _pool(arguments: argparse.Namespace, seed: int) -> Pool:
+    root = arguments.folder / f"seed-{seed}"
+    if (root / "meta" / "info.json").exists():
+        return Pool.open(root)
+    config = GenerateConfig(
+        seq1=arguments.correct,
+        mistakes=tuple((name, arguments.each) for name in MISTAKES),
+        match_length=True,
+        cameras=("left",),
+        size=arguments.size,
+        seed=seed,
+    )
+    return generate(root, config, jobs=arguments.jobs).pool
+
+
+if __name__ == "__main__":
+    sys.exit(main())
