@@ -21,6 +21,9 @@ class FilterArguments:
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
     segmenter: str = "truth"
     """Where segments come from: truth (the labels logged in the pool)."""
+    score: str = "norm"
+    """What demonstrations are judged by: norm (omissions, order and next steps against what most
+    of the pool does) or equation3 (the paper's next-step model)."""
     solver: str = "annealed"
     """Solver of equation 3: annealed."""
     groups: str = "auto"
@@ -72,6 +75,7 @@ def run(arguments: FilterArguments) -> int:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
     config = FilterConfig(
         segmenter=arguments.segmenter,
+        score=arguments.score,
         solver=arguments.solver,
         groups=arguments.groups,
         cameras=arguments.camera,

@@ -16,10 +16,12 @@ from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
 from filtering.segmentation.segmenter import Segmentation, segmenter_named
 from filtering.sequence import transitions
-from filtering.thresholds import GROUPS, Grouping, group_weights
+from filtering.thresholds import GROUPS
+from filtering.verdict import Verdict, judge_named
 from filtering.weights.problem import Problem
-from filtering.weights.score import Score, score
+from filtering.weights.score import score
 from filtering.weights.solvers import Solution, solver_named
+from filtering.weights.steps import StepCounts, StepList, count_steps
 from teasim.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow
@@ -36,6 +38,9 @@ class FilterConfig:
 
     segmenter: str = "truth"
     """Where segments come from: truth (the labels logged in the pool)."""
+    score: str = "norm"
+    """What demonstrations are judged by: norm (omissions, order and next steps against what most
+    of the pool does) or equation3 (the paper's next-step model)."""
     solver: str = "annealed"
     """Solver of equation 3: annealed."""
     groups: str = "auto"
@@ -58,6 +63,7 @@ class FilterConfig:
             ConfigError: in one sentence, with the choices.
         """
         segmenter_named(self.segmenter)
+        judge_named(self.score)
         solver_named(self.solver)
         subtraction_named(self.background)
         if self.groups not in GROUPS:
@@ -144,9 +150,12 @@ class DemoFilter:
             problem = Problem(rows, config.ridge)
             self.trusted_ = config.trusted_share * len(pool.episodes)
             solution = solver_named(config.solver)(problem, self.trusted_)
-            result = score(problem, solution)
-        self._learn(solution, result, group_weights(result.weights, config.groups))
-        findings = find_strange_steps(rows, result, self.segments_.spans, self.segments_.subtasks)
+            surprises = score(problem, solution)
+            judge = judge_named(config.score)
+            self._learn(solution, judge(self._counts(), surprises, config.groups))
+        findings = find_strange_steps(
+            rows, surprises, self.segments_.spans, self.segments_.subtasks
+        )
         self.findings_ = tuple(findings)
         self.reasons_ = tuple(
             explain(found, pool.fps) if flagged else ""
@@ -183,14 +192,21 @@ class DemoFilter:
                 "demonstrations."
             )
 
-    def _learn(self, solution: Solution, result: Score, grouping: Grouping) -> None:
-        self.weights_ = result.weights
-        self.losses_ = result.losses
+    def _counts(self) -> StepCounts:
+        demos = [
+            StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
+            for labels, spans in zip(self.segments_.labels(), self.segments_.spans, strict=True)
+        ]
+        return count_steps(demos, len(self.segments_.subtasks))
+
+    def _learn(self, solution: Solution, verdict: Verdict) -> None:
+        self.weights_ = verdict.weights
+        self.losses_ = verdict.losses
         self.trust_ = solution.weights
         self.objective_ = solution.objective
-        self.groups_ = grouping.groups
-        self.flagged_ = grouping.flagged
-        self.threshold_ = grouping.threshold
+        self.groups_ = verdict.grouping.groups
+        self.flagged_ = verdict.grouping.flagged
+        self.threshold_ = verdict.grouping.threshold
 
     def _identify(self, pool: Pool) -> None:
         self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]

@@ -7,6 +7,7 @@ import pytest
 
 from filtering.demo_filter import DemoFilter, FilterConfig
 from filtering.segmentation.segmenter import segmenter_named
+from filtering.verdict import JUDGES
 from teasim.errors import ConfigError, PoolError
 from teasim.pool import Pool
 from tests.filtering.conftest import TOY_SEQUENCES
@@ -65,6 +66,7 @@ def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ({"segmenter": "clustering"}, "Unknown segmenter 'clustering'; choose truth."),
+        ({"score": "luck"}, "Unknown score 'luck'; choose norm, equation3."),
         ({"solver": "exact"}, "Unknown solver 'exact'; choose annealed."),
         ({"groups": "7"}, "Unknown number of groups '7'; choose auto, 1, 2, 3."),
         (
@@ -122,3 +124,20 @@ def test_segment_labels_are_numbers_of_the_pools_subtasks(toy_pool: Pool) -> Non
     for labels, sequence in zip(found.labels(), TOY_SEQUENCES, strict=True):
         assert [found.subtasks[label] for label in labels] == list(sequence)
     assert np.max([max(labels) for labels in found.labels()]) < len(found.subtasks)
+
+
+@pytest.mark.parametrize("name", JUDGES)
+def test_every_score_finds_the_same_in_an_easy_pool(name: str, toy_pool: Pool) -> None:
+    found = DemoFilter(FilterConfig(score=name)).fit(toy_pool)
+    assert found.flagged_.tolist() == WRONG
+    assert (found.weights_ < found.threshold_).tolist() == WRONG
+    assert found.losses_[~found.flagged_].max() < found.losses_[found.flagged_].min()
+
+
+@pytest.mark.parametrize("name", JUDGES)
+def test_no_score_flags_anything_in_a_clean_pool(name: str, tmp_path: Path) -> None:
+    pool = make_toy_pool(tmp_path / "clean", [SEQ_1] * 5, frames_per_subtask=3)
+    found = DemoFilter(FilterConfig(score=name)).fit(pool)
+    assert not found.flagged_.any()
+    assert found.threshold_ == 0.0
+    assert found.weights_ == pytest.approx(np.ones(5), abs=0.01)
