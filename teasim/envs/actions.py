@@ -100,13 +100,3 @@ def check_action(action: object) -> np.ndarray:
             f"The action for {STATE_NAMES[which]} is {numbers[which]}; give a finite number."
         )
     return numbers
-
-
-def _clipped(action: np.ndarray) -> np.ndarray:
-    return np.minimum(np.maximum(action, -1.0), 1.0)
-
-
-def _limits(model: mujoco.MjModel) -> np.ndarray:
-    """Smallest and largest angle [rad] and opening [m] (16, 2)."""
-    ranges = [model.joint(name).range for arm in ARMS for name in ARM_JOINTS[arm]]
-    return np.array([*ranges, *[(GRIPPER_SQUEEZE, GRIPPER_OPEN)] * len(ARMS)])

@@ -52,7 +52,7 @@ class GroundTruth:
     """What is known about a demonstration; for scoring only, never read by a filter."""
 
     sequence: str
-    """Order of its sub-tasks: seq_1, seq_2 or seq_3 (paper, section 4)."""
+    """Order of its sub-tasks: seq_1, seq_2, seq_3 (paper, section 4) or legal (any correct one)."""
     correct: bool
     """True when the goal is reached in a legal order without a mistake."""
     mistakes: tuple[MistakeSpan, ...]
@@ -70,7 +70,7 @@ class EpisodeRecord:
     """Everything a writer must say about one demonstration beside its frames."""
 
     sequence: str
-    """Order of its sub-tasks: seq_1, seq_2 or seq_3."""
+    """Order of its sub-tasks: seq_1, seq_2, seq_3 or legal."""
     correct: bool
     """True when the goal is reached in a legal order without a mistake."""
     mistakes: tuple[MistakeSpan, ...]

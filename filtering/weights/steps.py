@@ -1,0 +1,84 @@
+"""What the step lists of a pool have in common, counted: occurrence, precedence, next steps.
+
+The default score asks three questions of every demonstration: which sub-tasks it does at all, which
+of two comes first, and what follows what. Here they become three arrays; nothing is fitted yet.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepList:
+    """One demonstration as a list of segments."""
+
+    labels: tuple[int, ...]
+    """(q,) sub-task of each segment, 0..T-1."""
+    lengths: tuple[int, ...]
+    """(q,) frames of each segment; what a short spurious segment says counts little."""
+
+    def __post_init__(self) -> None:
+        if len(self.labels) != len(self.lengths):
+            raise ValueError("labels and lengths differ in number")
+        if any(length < 1 for length in self.lengths):
+            raise ValueError("a segment has no frames")
+
+
+@dataclass(frozen=True)
+class StepCounts:
+    """The counts of D demonstrations over T sub-tasks; START and END are label T of bigrams."""
+
+    occurs: Array
+    """(D, T) x_da: 1 where a sub-task occurs."""
+    before: Array
+    """(D, T, T) q_dab: share of the pairs of an a-frame and a b-frame in which a is first; 0 where
+    the demonstration has not both."""
+    both: Array
+    """(D, T, T) 1 where the demonstration has a and b, and a is not b."""
+    follows: Array
+    """(D, T + 1, T + 1) B_dst: how often t comes right after s."""
+
+    @property
+    def n_demos(self) -> int:
+        """D."""
+        return len(self.occurs)
+
+    @property
+    def n_subtasks(self) -> int:
+        """T."""
+        return self.occurs.shape[1]
+
+
+def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
+    """Count what D demonstrations do.
+
+    Args:
+        demos: the step lists.
+        n_subtasks: T, one more than the largest label that may occur.
+    """
+    shape = (len(demos), n_subtasks, n_subtasks)
+    occurs, before = np.zeros(shape[:2]), np.zeros(shape)
+    follows = np.zeros((len(demos), n_subtasks + 1, n_subtasks + 1))
+    for d, demo in enumerate(demos):
+        occurs[d, list(demo.labels)] = 1.0
+        before[d] = _precedence(demo, n_subtasks)
+        path = [n_subtasks, *demo.labels, n_subtasks]
+        np.add.at(follows[d], (path[:-1], path[1:]), 1.0)
+    both = occurs[:, :, None] * occurs[:, None, :] * (1 - np.eye(n_subtasks))
+    return StepCounts(occurs, before * both, both, follows)
+
+
+def _precedence(demo: StepList, n_subtasks: int) -> Array:
+    """Return (T, T): share of frame pairs with the row's sub-task before the column's."""
+    frames = np.zeros((len(demo.labels), n_subtasks))
+    frames[np.arange(len(demo.labels)), list(demo.labels)] = demo.lengths
+    earlier = np.vstack([np.zeros(n_subtasks), np.cumsum(frames, axis=0)[:-1]])
+    pairs = earlier.T @ frames
+    total = frames.sum(axis=0)
+    possible = np.outer(total, total)
+    return np.divide(pairs, possible, out=np.zeros_like(pairs), where=possible > 0)
