@@ -53,7 +53,7 @@ class FitArguments:
     episodes: tuple[int, ...] = ()
     """Numbers of the demonstrations whose labels are used; drawn by chance if none is given."""
     labelled: int | None = None
-    """How many to draw; 12, or all of a smaller pool, if not given."""
+    """How many to draw of those that have labels; 12, or all if they are fewer, if not given."""
     epochs: int = 100
     """Times every video is shown."""
     camera: tuple[str, ...] = field(default=())

@@ -46,7 +46,7 @@ class FitConfig:
     episodes: tuple[int, ...] = ()
     """Numbers of the demonstrations whose labels are used; empty: as many as `labelled`, drawn."""
     labelled: int | None = None
-    """How many to draw; None: USUAL_LABELLED, or all of a smaller pool."""
+    """How many to draw of those that have labels; None: USUAL_LABELLED, or all of fewer."""
     cameras: tuple[str, ...] = ()
     """Cameras whose pictures are used; empty means all."""
     rate: float = 5.0
@@ -84,7 +84,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
     check_new_folder(out)
     frames = FrameSource(_cameras(pool, config.cameras), config.rate)
     chosen, others = _divide(pool, config)
-    subtasks = _subtask_names(pool, chosen)
+    subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
     began = time.perf_counter()
     videos = _labelled_videos(pool, chosen, subtasks, frames, jobs)
     # Frames of no sub-task, where there are any, are one more label, the last.
@@ -184,23 +184,42 @@ def _cameras(pool: Pool, cameras: tuple[str, ...]) -> tuple[str, ...]:
 
 def _divide(pool: Pool, config: FitConfig) -> tuple[list[Episode], list[Episode]]:
     """Return the demonstrations whose labels are used, and the others."""
-    count = len(pool.episodes)
     if config.episodes and config.labelled is not None:
         raise ConfigError("Both episodes and a number of labelled ones were given; choose one.")
-    if config.labelled is not None and not 1 <= config.labelled <= count:
-        raise ConfigError(f"labelled is {config.labelled}; choose 1 to {count}.")
+    used = _named(pool, config.episodes) if config.episodes else _drawn(pool, config)
+    chosen = [episode for episode in pool.episodes if episode.index in used]
+    return chosen, [episode for episode in pool.episodes if episode.index not in used]
+
+
+def _named(pool: Pool, indexes: Sequence[int]) -> set[int]:
+    """Return the numbers that were asked for, all of demonstrations with labels."""
     by_index = {episode.index: episode for episode in pool.episodes}
-    for index in config.episodes:
+    for index in indexes:
         if index not in by_index:
             raise ConfigError(
                 f"The pool has no demonstration {index}; choose from "
                 f"{min(by_index)} to {max(by_index)}."
             )
-    wanted = config.labelled or min(USUAL_LABELLED, count)
-    drawn = _draw(pool.episodes, wanted, config.network.seed)
-    used = set(config.episodes) or {episode.index for episode in drawn}
-    chosen = [episode for episode in pool.episodes if episode.index in used]
-    return chosen, [episode for episode in pool.episodes if episode.index not in used]
+        if not by_index[index].spans():
+            raise PoolError(
+                f"Demonstration {index} has no labelled sub-tasks, which a segmenter learns from; "
+                "choose others."
+            )
+    return set(indexes)
+
+
+def _drawn(pool: Pool, config: FitConfig) -> set[int]:
+    """Return the numbers of demonstrations drawn from those that have labels."""
+    labelled = [episode for episode in pool.episodes if episode.spans()]
+    if not labelled:
+        raise PoolError(
+            f"The pool '{pool.root}' has no labelled sub-tasks (column subtask_index), which a "
+            "segmenter learns from."
+        )
+    count = min(USUAL_LABELLED, len(labelled)) if config.labelled is None else config.labelled
+    if not 1 <= count <= len(labelled):
+        raise ConfigError(f"labelled is {count}; choose 1 to {len(labelled)}.")
+    return {episode.index for episode in _draw(labelled, count, config.network.seed)}
 
 
 def _draw(episodes: Sequence[Episode], count: int, seed: int) -> list[Episode]:
@@ -208,21 +227,6 @@ def _draw(episodes: Sequence[Episode], count: int, seed: int) -> list[Episode]:
     rng = np.random.default_rng(seed)
     drawn = rng.permutation(len(episodes))[:count]
     return [episodes[number] for number in sorted(drawn)]
-
-
-def _subtask_names(pool: Pool, chosen: Sequence[Episode]) -> tuple[str, ...]:
-    """Return the names to tell apart.
-
-    Raises:
-        PoolError: a demonstration has no labels.
-    """
-    for episode in chosen:
-        if not episode.spans():
-            raise PoolError(
-                f"Demonstration {episode.index} of '{pool.root}' has no labelled sub-tasks "
-                "(column subtask_index), which a segmenter learns from."
-            )
-    return pool.subtasks or tuple(sorted(_shown(chosen)))
 
 
 def _shown(episodes: Sequence[Episode]) -> set[str]:

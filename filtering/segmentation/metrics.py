@@ -1,9 +1,9 @@
 """How good a segmentation is: the published measures of action segmentation, and the paper's.
 
-Frame accuracy, edit score and F1@k are defined as in Lea et al. (CVPR 2017) and computed over a set
-of videos as MS-TCN's evaluation does it: accuracy over all frames, F1 from hits counted over all
-videos, the edit score as the mean over videos. One deviation: that program lets a video's last
-segment end a frame early, here every segment has all its frames.
+Frame accuracy, edit score and F1@k (Lea et al., ECCV 2016 and CVPR 2017) are computed over a set of
+videos as the evaluation program of MS-TCN does it: accuracy over all frames, F1 from hits counted
+over all videos, the edit score as the mean over videos. One deviation: that program lets a video's
+last segment end a frame early, here every segment has all its frames.
 
 Frames labelled NO_SUBTASK count for the frame accuracy but belong to no segment.
 """

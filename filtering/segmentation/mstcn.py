@@ -1,7 +1,7 @@
 """MS-TCN++ (Li, Abu Farha, Liu, Cheng, Gall, TPAMI 2020): the network and its loss.
 
-A prediction stage of dual dilated layers labels the frames (section 3.2), then refinement stages of
-dilated residual layers each correct what the stage before said (section 3.3).
+A prediction stage of dual dilated layers labels the frames, then refinement stages of dilated
+residual layers each correct what the stage before said.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from torch.nn import functional
 KERNEL = 3
 """Frames per convolution."""
 DROPOUT = 0.5
-"""Share of activations dropped in training (section 4)."""
+"""Share of activations dropped in training."""
 SMOOTHING = 0.15
-"""Weight of the smoothing loss, lambda of equation 9."""
+"""Weight of the smoothing loss, the paper's lambda."""
 LARGEST_JUMP = 4.0
-"""Jump of a log-probability from one frame to the next above which it costs no more, tau of
-equation 8 [nats]; squared 16."""
+"""Jump of a log-probability from one frame to the next above which it costs no more [nats], the
+paper's tau."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class MSTCNShape:
 
 
 class DualDilatedLayer(nn.Module):
-    """Looks near and far at once: two dilations, fused, with a residual (figure 3)."""
+    """Looks near and far at once: two dilations, fused, with a residual."""
 
     def __init__(self, channels: int, near: int, far: int) -> None:
         """Create a layer of dilations `near` and `far` [frames]."""
@@ -58,7 +58,7 @@ class DualDilatedLayer(nn.Module):
 
 
 class DilatedResidualLayer(nn.Module):
-    """One dilated convolution, ReLU, a 1x1 convolution, with a residual (MS-TCN, figure 2)."""
+    """One dilated convolution, ReLU, a 1x1 convolution, with a residual, as in MS-TCN."""
 
     def __init__(self, channels: int, dilation: int) -> None:
         """Create a layer of `dilation` [frames]."""
@@ -105,7 +105,7 @@ class MSTCN(nn.Module):
 def mstcn_loss(scores: Tensor, labels: Tensor) -> Tensor:
     """Sum over the stages of cross-entropy + SMOOTHING x truncated mean squared error.
 
-    The smoothing loss (equations 7 and 8) is the squared change of the log-probabilities from the
+    The smoothing loss (T-MSE) is the squared change of the log-probabilities from the
     frame before, which gets no gradient, over all labels and the T - 1 pairs of frames.
 
     Args:

@@ -1,6 +1,6 @@
 """Fitting MS-TCN++ to labelled videos.
 
-As published (Li et al., TPAMI 2020, section 4): Adam, one video per step. Two things are added,
+As published (Li et al., TPAMI 2020): Adam, one video per step. Two things are added,
 both for demonstrations, whose order must be judged later and so must not be learnt by heart:
 features are scaled within each video, and some videos are shown with their segments rearranged.
 """

@@ -191,10 +191,24 @@ def test_a_fit_that_cannot_be_is_refused(toy_pool, tmp_path, options, message):
 def test_a_pool_without_labels_teaches_nothing(toy_pool, tmp_path, monkeypatch):
     monkeypatch.setattr(Episode, "spans", lambda _: ())
     with pytest.raises(PoolError) as caught:
-        fit_segmenter(toy_pool.root, tmp_path / "s", FIT)
+        fit_segmenter(toy_pool.root, tmp_path / "s", replace(FIT, episodes=()))
     assert str(caught.value) == (
-        f"Demonstration 0 of '{toy_pool.root}' has no labelled sub-tasks (column subtask_index), "
-        "which a segmenter learns from."
+        f"The pool '{toy_pool.root}' has no labelled sub-tasks (column subtask_index), which a "
+        "segmenter learns from."
+    )
+
+
+def test_labels_are_drawn_from_demonstrations_that_have_some(toy_pool, tmp_path, monkeypatch):
+    logged = Episode.spans
+    monkeypatch.setattr(
+        Episode, "spans", lambda episode: logged(episode) if episode.index in (1, 4, 6) else ()
+    )
+    result = fit_segmenter(toy_pool.root, tmp_path / "s", replace(QUICK, episodes=()))
+    assert result.labelled == (1, 4, 6)
+    with pytest.raises(PoolError) as caught:
+        fit_segmenter(toy_pool.root, tmp_path / "t", QUICK)
+    assert str(caught.value) == (
+        "Demonstration 0 has no labelled sub-tasks, which a segmenter learns from; choose others."
     )
 
 
