@@ -106,7 +106,7 @@ def run_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any]:
         "versions": _versions(),
         "cameras": list(fitted.cameras_),
         "subtasks": list(fitted.segments_.subtasks),
-        "segmentation": _segmentation_scores(fitted, pool),
+        "segmentation": _segmentation_record(fitted, pool),
         "demonstrations": len(fitted.weights_),
         "flagged": int(fitted.flagged_.sum()),
         "groups": int(fitted.groups_.max()) + 1,
@@ -157,11 +157,15 @@ def exclude_list(pool: Pool, exclude: Sequence[int]) -> str:
     )
 
 
-def _segmentation_scores(fitted: DemoFilter, pool: Pool) -> dict[str, Any] | None:
-    """Return how good inferred segments are; None for given ones, or without known truth."""
-    if fitted.segments_.posteriors is None:
+def _segmentation_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any] | None:
+    """Return what inferred the segments and how good they are, where that is known."""
+    found = fitted.segments_
+    if found.weights_sha256 is None:
         return None
-    return scores_json(score_episodes(pool.episodes, fitted.segments_)) or None
+    return {
+        "weights_sha256": found.weights_sha256,
+        "scores": scores_json(score_episodes(pool.episodes, found)),
+    }
 
 
 def _list(indexes: Sequence[int], *comments: str) -> str:

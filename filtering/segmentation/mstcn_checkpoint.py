@@ -10,7 +10,6 @@ from typing import Any
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
-from safetensors.torch import save as save_tensors
 
 from filtering.frame_features import FrameSource
 from filtering.pretrained import RECIPE, weights_digest
@@ -32,7 +31,7 @@ def save_segmenter(segmenter: MSTCNSegmenter, folder: Path, record: Mapping[str,
     Raises:
         OSError: the folder cannot be written.
     """
-    weights = save_tensors(segmenter.network.state_dict())
+    weights = segmenter.weights()
     description = {
         "format": FORMAT,
         "version": VERSION,

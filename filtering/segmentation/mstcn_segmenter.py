@@ -1,10 +1,12 @@
 """A fitted MS-TCN++ with all that is needed to use it on another pool."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from safetensors.torch import save as save_tensors
 
 from filtering.frame_features import (
     FrameSource,
@@ -65,7 +67,12 @@ class MSTCNSegmenter:
             spans=tuple(spans for spans, _ in described),
             posteriors=tuple(posteriors for _, posteriors in described),
             labelled=self.labelled,
+            weights_sha256=hashlib.sha256(self.weights()).hexdigest(),
         )
+
+    def weights(self) -> bytes:
+        """Return the weights of the network as safetensors."""
+        return save_tensors(self.network.state_dict())
 
     def posteriors(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the probability of each label at each moment, (n, C), for features (n, D).

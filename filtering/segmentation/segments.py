@@ -26,6 +26,8 @@ class Segmentation:
     to 1 is the probability of none of them. None where segments were given, not inferred."""
     labelled: frozenset[str] = frozenset()
     """demo_id of the demonstrations whose true labels the segmenter was fitted to."""
+    weights_sha256: str | None = None
+    """Which segmenter inferred them; None where segments were given."""
 
     def labels(self) -> list[list[int]]:
         """Return per demonstration the label numbers of its segments, 0..T-1."""

@@ -85,9 +85,11 @@ def test_the_filter_takes_a_segmenter_and_writes_down_how_good_it_was(
     argv = [str(toy_pool.root), "-o", str(tmp_path / "out"), "--jobs", "1"]
     assert filter_verb([*argv, "--segmenter", str(fitted[0])]) == 0
     assert "2 of 7 demonstrations are flagged." in capsys.readouterr().out
-    record = json.loads((tmp_path / "out" / "filter.json").read_text())
-    assert record["segmentation"]["unseen"]["videos"] == 4
-    assert record["segmentation"]["unseen"]["accuracy"] > 90.0
+    record = json.loads((tmp_path / "out" / "filter.json").read_text())["segmentation"]
+    assert record["scores"]["unseen"]["videos"] == 4
+    assert record["scores"]["unseen"]["accuracy"] > 90.0
+    described = json.loads((fitted[0] / "segmenter.json").read_text())
+    assert record["weights_sha256"] == described["weights_sha256"]
     assert filter_verb([*argv[:2], str(tmp_path / "truth"), "--jobs", "1"]) == 0
     assert json.loads((tmp_path / "truth" / "filter.json").read_text())["segmentation"] is None
 
