@@ -11,7 +11,16 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("teasim", "filtering", "policies")
-HEAVY = {"torch", "mujoco", "mink", "cv2", "stable_baselines3", "sklearn", "scipy"}
+HEAVY = {
+    "torch",
+    "torch_geometric",
+    "mujoco",
+    "mink",
+    "cv2",
+    "stable_baselines3",
+    "sklearn",
+    "scipy",
+}
 
 
 def loaded_by(statement: str) -> set[str]:
