@@ -1,4 +1,4 @@
-"""The verb `filter`; what it needs is imported only when it runs."""
+"""The verbs `segment` and `filter`; what they need is imported only when they run."""
 
 import sys
 from collections.abc import Sequence
@@ -20,7 +20,8 @@ class FilterArguments:
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
     segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool)."""
+    """Where segments come from: truth (the labels logged in the pool), or the folder of a segmenter
+    that `teasim segment fit` made."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
@@ -42,6 +43,69 @@ class FilterArguments:
     """Replace an earlier filter's output in the output folder."""
     debug: bool = False
     """Show the traceback of an error."""
+
+
+@dataclass(frozen=True)
+class FitArguments:
+    """Fit MS-TCN++ to the labelled sub-tasks of some demonstrations of a pool."""
+
+    pool: Annotated[Path, tyro.conf.Positional]
+    """The pool: a LeRobot v3.0 data set with labelled sub-tasks."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    """New folder for the segmenter."""
+    episodes: tuple[int, ...] = ()
+    """Numbers of the demonstrations whose labels are used; drawn by chance if none is given."""
+    labelled: int | None = None
+    """How many to draw of those that have labels; 12, or all if they are fewer, if not given."""
+    epochs: int = 100
+    """Times every video is shown."""
+    camera: tuple[str, ...] = field(default=())
+    """Cameras whose pictures are used; all if none is named."""
+    rate: float = 5.0
+    """Moments looked at per second of video."""
+    scaling: str = "video"
+    """Scale features within each video (video), or by the training set alone (training)."""
+    rearranged: float = 0.5
+    """Chance that a video is shown with its segments in a random order, 0 to 1."""
+    seed: int = 0
+    """Seed of the network, and of the draw."""
+    jobs: int = 0
+    """Worker processes; 0 means one per core."""
+
+
+@dataclass(frozen=True)
+class PredictArguments:
+    """Label the frames of a pool, or of an MS-TCN folder with features."""
+
+    segmenter: Annotated[Path, tyro.conf.Positional]
+    """Folder that `teasim segment fit` made."""
+    source: Annotated[Path, tyro.conf.Positional]
+    """The pool, or a folder with mapping.txt and features/*.npy."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    """New folder for predictions, posteriors and, where the truth is known, metrics.json."""
+    jobs: int = 0
+    """Worker processes; 0 means one per core."""
+
+
+SegmentArguments = (
+    Annotated[FitArguments, tyro.conf.subcommand("fit")]
+    | Annotated[PredictArguments, tyro.conf.subcommand("predict")]
+)
+
+
+def segment(argv: Sequence[str] | None = None) -> int:
+    """Fit a segmenter to labelled demonstrations, or find the sub-tasks in videos with it.
+
+    Raises:
+        TeasimError: bad input, which the command turns into exit code 2.
+    """
+    arguments: FitArguments | PredictArguments = tyro.cli(
+        SegmentArguments,
+        args=argv,
+        prog="teasim segment",
+        description="Fit a segmenter to labelled demonstrations, or find the sub-tasks in videos.",
+    )
+    return _fit(arguments) if isinstance(arguments, FitArguments) else _predict(arguments)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -94,3 +158,51 @@ def run(arguments: FilterArguments) -> int:
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
     print(f"report: {arguments.out / 'report.html'}")
     return 1 if share > arguments.max_flagged else 0
+
+
+def _fit(arguments: FitArguments) -> int:
+    from filtering.segmentation.mstcn_training import MSTCNConfig
+    from filtering.segmentation.scoring import scores_table
+    from filtering.segmenting import FitConfig, fit_segmenter
+    from teasim import parallel
+
+    config = FitConfig(
+        episodes=arguments.episodes,
+        labelled=arguments.labelled,
+        cameras=arguments.camera,
+        rate=arguments.rate,
+        network=MSTCNConfig(
+            epochs=arguments.epochs,
+            scaling=arguments.scaling,
+            rearranged=arguments.rearranged,
+            seed=arguments.seed,
+        ),
+    )
+    jobs = arguments.jobs or parallel.default_jobs()
+    result = fit_segmenter(arguments.pool, arguments.out, config, jobs=jobs)
+    for name in result.never_shown:
+        print(
+            f"teasim: warning: no labelled demonstration shows '{name}', which others of the pool "
+            "do; the segmenter cannot find it.",
+            file=sys.stderr,
+        )
+    print(f"fitted to {len(result.labelled)} demonstrations: {_listed(result.labelled)}")
+    print(scores_table(result.scores))
+    print(f"segmenter: {arguments.out}")
+    return 0
+
+
+def _predict(arguments: PredictArguments) -> int:
+    from filtering.segmentation.scoring import scores_table
+    from filtering.segmenting import predict
+    from teasim import parallel
+
+    jobs = arguments.jobs or parallel.default_jobs()
+    scores = predict(arguments.segmenter, arguments.source, arguments.out, jobs=jobs)
+    print(scores_table(scores) if scores else "The truth is not known, so nothing is scored.")
+    print(f"predictions: {arguments.out / 'predictions'}")
+    return 0
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers))

@@ -14,7 +14,8 @@ from filtering.background import subtraction_named
 from filtering.explain import Finding, explain, find_strange_steps
 from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
-from filtering.segmentation.segmenter import Segmentation, segmenter_named
+from filtering.segmentation.segmenter import segmenter_named
+from filtering.segmentation.segments import Segmentation
 from filtering.sequence import transitions
 from filtering.thresholds import GROUPS
 from filtering.verdict import Verdict, judge_named
@@ -37,7 +38,8 @@ class FilterConfig:
     """How a pool is filtered."""
 
     segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool)."""
+    """Where segments come from: truth (the labels logged in the pool), or the folder of a fitted
+    segmenter (the logged labels are then not read)."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
@@ -132,7 +134,7 @@ class DemoFilter:
         self._check(pool)
         self.cameras_ = _chosen_cameras(pool, config.cameras)
         with self._timed("segments"):
-            self.segments_ = segmenter_named(config.segmenter)(pool)
+            self.segments_ = segmenter_named(config.segmenter)(pool, jobs=jobs)
         with self._timed("features"):
             features = segment_features(
                 pool,

@@ -12,6 +12,7 @@ from typing import Any
 from filtering.demo_filter import DemoFilter
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
+from filtering.segmentation.scoring import score_episodes, scores_json
 from teasim.errors import ConfigError, TeasimError
 from teasim.pool import Pool
 from teasim.pool.files import write_json, write_text
@@ -105,6 +106,7 @@ def run_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any]:
         "versions": _versions(),
         "cameras": list(fitted.cameras_),
         "subtasks": list(fitted.segments_.subtasks),
+        "segmentation": _segmentation_record(fitted, pool),
         "demonstrations": len(fitted.weights_),
         "flagged": int(fitted.flagged_.sum()),
         "groups": int(fitted.groups_.max()) + 1,
@@ -153,6 +155,17 @@ def exclude_list(pool: Pool, exclude: Sequence[int]) -> str:
         f"robomimic: leave these names out of the mask you train on: {demos}",
         f"Minari:    dataset.filter_episodes(lambda episode: episode.id not in {indexes})",
     )
+
+
+def _segmentation_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any] | None:
+    """Return what inferred the segments and how good they are, where that is known."""
+    found = fitted.segments_
+    if found.weights_sha256 is None:
+        return None
+    return {
+        "weights_sha256": found.weights_sha256,
+        "scores": scores_json(score_episodes(pool.episodes, found)),
+    }
 
 
 def _list(indexes: Sequence[int], *comments: str) -> str:

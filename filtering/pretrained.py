@@ -6,6 +6,9 @@ from pathlib import Path
 
 from teasim.errors import ConfigError
 
+RECIPE = "efficientnet-lite0 b10 b15 avg max fp32, v1"
+"""What is computed from a frame; changes whenever that changes, and with it every cache key."""
+
 
 def weights_path() -> Path:
     """Return the file with the pretrained weights.

@@ -13,10 +13,9 @@ from safetensors.torch import save as save_tensors
 
 from policies.base import ObservationSpec
 from policies.networks import DecisionNetwork, NetworkShape
-from policies.outputs import write_bytes
 from policies.subtask_policy import SubtaskPolicy
 from teasim.errors import CheckpointError
-from teasim.pool.files import write_json
+from teasim.pool.files import write_bytes, write_json
 
 FORMAT = "teasim-policy"
 VERSION = 1

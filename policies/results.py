@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from policies.evaluation import Scores
-from policies.outputs import write_bytes
 from policies.rollout import Episode
 from policies.statistics import Rate
 from teasim.errors import ConfigError
-from teasim.pool.files import write_json
+from teasim.pool.files import write_bytes, write_json
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from pathlib import Path
 from policies.checkpoint import save_policy
 from policies.demos import DemosConfig, load_decisions
 from policies.learners import find_learner
-from policies.outputs import check_folder
 from policies.weighting import demo_weights
 from teasim.pool import Pool
+from teasim.pool.files import check_new_folder
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int =
     demos = DemosConfig(observe=config.observe)
     pool = Pool.open(pool_path)
     weights = demo_weights(pool, config.weights, config.use)
-    check_folder(run)
+    check_new_folder(run)
     began = time.perf_counter()
     samples = load_decisions(pool, demos, jobs=jobs)
     learner = kind.make(seed=config.seed).fit(samples, weights)

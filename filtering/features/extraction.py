@@ -1,7 +1,5 @@
 """Frames of a video to one feature vector per segment."""
 
-import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +9,13 @@ from numpy.typing import NDArray
 
 from filtering.background import subtraction_named
 from filtering.cache import ArrayCache, default_folder
+from filtering.frame_features import clip_key
 from filtering.frames import fit_size, segment_indices, uniform_indices
-from filtering.pretrained import weights_digest
 from teasim import parallel
 from teasim.pool import Pool, Span, VideoClip, read_frames
-from teasim.pool.videos import video_content
 
 OVERVIEW = 31
 """Frames spread over the whole video from which its background is learnt."""
-RECIPE = "efficientnet-lite0 b10 b15 avg max fp32, v1"
-"""What is computed from a frame; changes whenever that changes, and with it every cache key."""
 
 
 @dataclass(frozen=True)
@@ -126,11 +121,5 @@ def _frames_of(task: VideoTask) -> NDArray[np.int64]:
 
 def _key(task: VideoTask) -> str:
     """Hash the encoded frames of the clip, which of them are used, and all that is done to them."""
-    clip = task.clip
-    content = hashlib.sha256()
-    for digest in video_content(clip.path).digests[clip.start_frame :][: clip.length]:
-        content.update(digest)
     used = _frames_of(task).tolist()
-    recipe = [RECIPE, weights_digest(), task.background, OVERVIEW, clip.length, used]
-    content.update(json.dumps(recipe).encode())
-    return content.hexdigest()
+    return clip_key(task.clip, [task.background, OVERVIEW, task.clip.length, used])

@@ -1,36 +1,19 @@
 """Segments of every demonstration of a pool, by name of the segmenter."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from pathlib import Path
 
+from filtering.segmentation.segments import Segmentation, Segmenter
 from teasim.errors import ConfigError, PoolError
 from teasim.pool import Episode, Pool, Span
 
 
-@dataclass(frozen=True)
-class Segmentation:
-    """The segments of a pool."""
-
-    subtasks: tuple[str, ...]
-    """Names of the T sub-task labels."""
-    spans: tuple[tuple[Span, ...], ...]
-    """Per demonstration its q segments in order of time [frames]."""
-
-    def labels(self) -> list[list[int]]:
-        """Return per demonstration the label numbers of its segments, 0..T-1."""
-        numbers = {name: number for number, name in enumerate(self.subtasks)}
-        return [[numbers[span.subtask] for span in spans] for spans in self.spans]
-
-
-Segmenter = Callable[[Pool], Segmentation]
-
-
-def truth(pool: Pool) -> Segmentation:
+def truth(pool: Pool, *, jobs: int = 1) -> Segmentation:
     """Use the sub-task spans logged in the pool.
 
     Raises:
         PoolError: a demonstration has no labelled sub-task, or a span leaves the video.
     """
+    del jobs  # nothing to compute
     spans = tuple(_logged_spans(episode) for episode in pool.episodes)
     seen = {span.subtask for demo in spans for span in demo}
     # Some recorders log spans without a table of names; their order must not depend on the demos'.
@@ -63,11 +46,20 @@ SEGMENTERS: dict[str, Segmenter] = {"truth": truth}
 
 
 def segmenter_named(name: str) -> Segmenter:
-    """Return a segmenter.
+    """Return a segmenter by its name, or the one that was saved in the folder of that name.
 
     Raises:
         ConfigError: there is none of that name.
+        CheckpointError: the folder holds no segmenter, or a damaged one.
     """
-    if name not in SEGMENTERS:
-        raise ConfigError(f"Unknown segmenter '{name}'; choose {', '.join(SEGMENTERS)}.")
-    return SEGMENTERS[name]
+    if name in SEGMENTERS:
+        return SEGMENTERS[name]
+    if not Path(name).is_dir():
+        raise ConfigError(
+            f"Unknown segmenter '{name}'; choose {', '.join(SEGMENTERS)} or the folder of one "
+            "that `teasim segment fit` made."
+        )
+    # Only here: true labels need no torch.
+    from filtering.segmentation.mstcn_checkpoint import load_segmenter
+
+    return load_segmenter(Path(name)).segment

@@ -25,7 +25,6 @@ from policies.checkpoint import save_policy
 from policies.demos import load_decisions
 from policies.evaluation import EvaluationConfig, Scores, evaluate
 from policies.experiments.score_section import score_section, sentences
-from policies.outputs import check_folder
 from policies.results import as_json
 from policies.results import summary as rates
 from policies.rollout import EnvironmentConfig
@@ -34,7 +33,7 @@ from policies.weighting import demo_weights
 from teasim import parallel
 from teasim.errors import ConfigError
 from teasim.pool import Pool
-from teasim.pool.files import write_json
+from teasim.pool.files import check_new_folder, write_json
 from teasim.pool.weight_table import read_weight_table
 
 ALL = "all demonstrations"
@@ -111,7 +110,7 @@ def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
         ConfigError: `out` is in use.
         TeasimError: the pool could not be generated.
     """
-    check_folder(out)
+    check_new_folder(out)
     watch = Stopwatch()
     pool = generate_pool(out / "pool", config, jobs)
     watch.lap("generate")

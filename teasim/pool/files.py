@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from teasim.errors import ConfigError
+
 
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Let `write` fill a temporary file beside `path`, then rename it to `path`."""
@@ -24,7 +26,16 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write `text` atomically as UTF-8 with line feeds."""
-    write_atomically(path, lambda target: _write_bytes(target, text.encode()))
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write `content` atomically."""
+
+    def fill(target: Path) -> None:
+        target.write_bytes(content)
+
+    write_atomically(path, fill)
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -42,6 +53,14 @@ def link_or_copy(source: Path, target: Path) -> None:
         sync(target)
 
 
+def check_new_folder(path: Path) -> None:
+    """Raise ConfigError unless `path` is free for output: nothing there yet, or an empty folder."""
+    if path.is_dir() and any(path.iterdir()):
+        raise ConfigError(f"The output folder '{path}' is in use; choose a new or empty one.")
+    if path.exists() and not path.is_dir():
+        raise ConfigError(f"The output folder '{path}' is a file; choose a new or empty folder.")
+
+
 def sha256_of(path: Path) -> str:
     """Hexadecimal SHA-256 of a file's bytes."""
     with path.open("rb") as stream:
@@ -55,7 +74,3 @@ def sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _write_bytes(path: Path, content: bytes) -> None:
-    path.write_bytes(content)

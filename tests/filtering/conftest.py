@@ -1,5 +1,6 @@
 """A small toy pool and a feature cache of the test session's own."""
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,15 @@ from tests.toy_pool import SEQ_1, make_toy_pool
 WITHOUT_WATER = tuple(name for name in SEQ_1 if name != "add_water")
 WITHOUT_OFF = tuple(name for name in SEQ_1 if name != "turn_off_oven")
 TOY_SEQUENCES = [SEQ_1, SEQ_1, WITHOUT_WATER, SEQ_1, SEQ_1, WITHOUT_OFF, SEQ_1]
+
+
+def real_data(name: str) -> Path:
+    """Folder of a public data set, in TEASIM_DATA or ../shared/data; without it the test skips."""
+    shared = Path(__file__).parents[2].parent / "shared" / "data"
+    folder = Path(os.environ.get("TEASIM_DATA", shared)) / name
+    if not folder.is_dir():
+        pytest.skip(f"the data set {name} is not here; set TEASIM_DATA to the folder it is in")
+    return folder
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -65,7 +65,11 @@ def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"segmenter": "clustering"}, "Unknown segmenter 'clustering'; choose truth."),
+        (
+            {"segmenter": "clustering"},
+            "Unknown segmenter 'clustering'; choose truth or the folder of one that "
+            "`teasim segment fit` made.",
+        ),
         ({"score": "luck"}, "Unknown score 'luck'; choose norm, equation3."),
         ({"solver": "exact"}, "Unknown solver 'exact'; choose annealed."),
         ({"groups": "7"}, "Unknown number of groups '7'; choose auto, 1, 2, 3."),

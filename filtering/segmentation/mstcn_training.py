@@ -1,0 +1,261 @@
+"""Fitting MS-TCN++ to labelled videos.
+
+As published (Li et al., TPAMI 2020): Adam, one video per step. Two things are added,
+both for demonstrations, whose order must be judged later and so must not be learnt by heart:
+features are scaled within each video, and some videos are shown with their segments rearranged.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from tqdm import tqdm
+
+from filtering.backbone import one_thread
+from filtering.segmentation.mstcn import MSTCN, MSTCNShape, mstcn_loss
+from filtering.segmentation.segments import runs
+from teasim.errors import ConfigError
+
+SCALINGS = ("video", "training")
+"""What features are centred and scaled by before the training set's own moments."""
+SCALE_FLOOR = 0.05
+"""Least scale of a feature [mean scale of all]; what hardly varies must not become noise."""
+FEWEST_FRAMES = 2
+"""The smoothing loss compares frames."""
+
+
+@dataclass(frozen=True)
+class LabelledVideo:
+    """A video whose frames are labelled."""
+
+    name: str
+    """What it is called in messages."""
+    features: NDArray[np.float32]
+    """(n, D), one row per frame."""
+    labels: NDArray[np.int64]
+    """(n,) label of each frame, 0..C-1."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be learnt from.
+
+        Raises:
+            ConfigError: too few frames, features and labels of different length, or not finite.
+        """
+        if len(self.labels) < FEWEST_FRAMES:
+            raise ConfigError(
+                f"The video {self.name} has {len(self.labels)} labelled frame; a segmenter learns "
+                f"from videos of {FEWEST_FRAMES} or more."
+            )
+        if self.features.ndim != 2 or len(self.features) != len(self.labels):
+            raise ConfigError(
+                f"The video {self.name} has features of shape {self.features.shape} but "
+                f"{len(self.labels)} labels; one row per label is needed."
+            )
+        if not np.isfinite(self.features).all():
+            raise ConfigError(f"The features of the video {self.name} are not all finite numbers.")
+
+
+@dataclass(frozen=True)
+class MSTCNConfig:
+    """How MS-TCN++ is fitted; sizes and step size are those of its paper."""
+
+    epochs: int = 100
+    """Times every video is shown."""
+    learning_rate: float = 5e-4
+    """Step size of Adam."""
+    channels: int = 64
+    """Channels of every hidden layer."""
+    prediction_layers: int = 11
+    """Dual dilated layers of the prediction stage."""
+    refinement_stages: int = 3
+    """Stages after the prediction stage."""
+    refinement_layers: int = 10
+    """Dilated residual layers of each refinement stage."""
+    scaling: str = "video"
+    """video: each video's features get mean 0 and scale 1 first (another camera or light then
+    changes little); training: only the training set's mean and scale are taken out."""
+    rearranged: float = 0.5
+    """Chance that a video is shown with its segments in a random order, some left out [0..1]."""
+    left_out: float = 0.2
+    """Chance that a segment is left out of a video so shown [0..1]."""
+    seed: int = 0
+    """Seed of the initial weights, the dropout, the order of videos and their rearrangement."""
+
+    def __post_init__(self) -> None:
+        """Refuse settings that cannot train.
+
+        Raises:
+            ConfigError: in one sentence, with the choices.
+        """
+        counts = ("epochs", "channels", "prediction_layers", "refinement_layers")
+        for name, least in [*((name, 1) for name in counts), ("refinement_stages", 0), ("seed", 0)]:
+            if getattr(self, name) < least:
+                raise ConfigError(f"{name} is {getattr(self, name)}; choose {least} or more.")
+        if not self.learning_rate > 0.0:
+            raise ConfigError(f"learning_rate is {self.learning_rate}; choose a number above 0.")
+        for name in ("rearranged", "left_out"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ConfigError(f"{name} is {getattr(self, name)}; choose a chance from 0 to 1.")
+        if self.scaling not in SCALINGS:
+            raise ConfigError(f"Unknown scaling '{self.scaling}'; choose {', '.join(SCALINGS)}.")
+
+    def shape(self, features: int, labels: int) -> MSTCNShape:
+        """Return the sizes of the network for D features and C labels."""
+        return MSTCNShape(
+            features,
+            labels,
+            self.channels,
+            self.prediction_layers,
+            self.refinement_stages,
+            self.refinement_layers,
+        )
+
+
+class MSTCNLearner:
+    """minimise over theta: sum over videos of `mstcn_loss`, by Adam, one video per step.
+
+    After `fit`:
+        network_: the network, ready for inference.
+        history_: mean loss of each epoch [nats, summed over the stages].
+
+    On one thread, with random numbers of its own: videos, settings and seed give the same bits.
+    """
+
+    network_: MSTCN
+    history_: tuple[float, ...]
+
+    def __init__(self, config: MSTCNConfig | None = None) -> None:
+        """Keep the settings; `fit` does the work and never changes them."""
+        self.config = MSTCNConfig() if config is None else config
+
+    def fit(self, videos: Sequence[LabelledVideo], n_labels: int) -> Self:
+        """Learn to label frames with 0..n_labels-1.
+
+        Raises:
+            ConfigError: there is no video, they differ in the number of features, or a label is
+                out of range.
+        """
+        _check(videos, n_labels)
+        # dropout and initial weights draw from torch's global generator: lend it a seed.
+        with one_thread(), torch.random.fork_rng(devices=[]):
+            torch.manual_seed(self.config.seed)
+            network = MSTCN(self.config.shape(videos[0].features.shape[1], n_labels))
+            _standardise(network, [scaled(v.features, self.config.scaling) for v in videos])
+            self.history_ = self._descend(network, videos)
+        self.network_ = network.eval()
+        return self
+
+    def _descend(self, network: MSTCN, videos: Sequence[LabelledVideo]) -> tuple[float, ...]:
+        rng = np.random.default_rng(self.config.seed)
+        optimizer = torch.optim.Adam(network.parameters(), lr=self.config.learning_rate)
+        network.train()
+        history = []
+        epochs = range(self.config.epochs)
+        shown = sys.stderr.isatty()
+        for _ in tqdm(epochs, "fitting", disable=not shown, file=sys.stderr, leave=False):
+            losses = []
+            for number in rng.permutation(len(videos)):
+                features, labels = self._shown(videos[number], rng)
+                optimizer.zero_grad()
+                loss = mstcn_loss(network(_tensor(features)), torch.from_numpy(labels)[None])
+                loss.backward()
+                optimizer.step()
+                losses.append(loss.item())
+            history.append(float(np.mean(losses)))
+        return tuple(history)
+
+    def _shown(
+        self, video: LabelledVideo, rng: np.random.Generator
+    ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """Return the features and labels of a video as it is shown this time."""
+        order = np.arange(len(video.labels))
+        if rng.random() < self.config.rearranged:
+            order = rearrange(video.labels, rng, self.config.left_out)
+        return scaled(video.features[order], self.config.scaling), video.labels[order]
+
+
+def frame_posteriors(
+    network: MSTCN, features: NDArray[np.float32], scaling: str
+) -> NDArray[np.float32]:
+    """Return the probability of each label in each frame, (n, C), for features (n, D).
+
+    Args:
+        network: after training.
+        features: of one whole video.
+        scaling: that of the training.
+    """
+    with one_thread(), torch.inference_mode():
+        scores = network(_tensor(scaled(features, scaling)))[-1, 0]
+        posteriors: NDArray[np.float32] = torch.softmax(scores, dim=0).T.contiguous().numpy()
+    return posteriors
+
+
+def scaled(features: NDArray[np.float32], scaling: str) -> NDArray[np.float32]:
+    """Return features (n, D) of a video with mean 0 and scale 1, or as they are for `training`."""
+    if scaling == "training":
+        return features
+    mean, scale = _moments(features)
+    return (features - mean) / scale
+
+
+def rearrange(
+    labels: NDArray[np.int64], rng: np.random.Generator, left_out: float
+) -> NDArray[np.int64]:
+    """Return frame numbers of a video with its segments shuffled and some of them left out.
+
+    At least two frames stay.
+
+    Args:
+        labels: (n,) label of each frame; a run of equal ones is a segment.
+        rng: source of randomness.
+        left_out: chance that a segment is left out.
+    """
+    found = runs(labels)
+    order = rng.permutation(len(found))
+    kept = [number for number in order if rng.random() >= left_out]
+    if sum(found[number].length for number in kept) < FEWEST_FRAMES:
+        kept = list(order)
+    return np.concatenate([np.arange(found[n].start, found[n].stop) for n in kept])
+
+
+def _standardise(network: MSTCN, features: Sequence[NDArray[np.float32]]) -> None:
+    """Set the network's normaliser to the moments of the training set, per video (n, D)."""
+    mean, scale = _moments(np.concatenate(features))
+    network.feature_mean.copy_(torch.from_numpy(mean)[:, None])
+    network.feature_scale.copy_(torch.from_numpy(scale)[:, None])
+
+
+def _moments(features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return mean and scale, (D,) each, of rows (n, D)."""
+    mean = features.mean(axis=0, dtype=np.float64)
+    deviation = features.std(axis=0, dtype=np.float64)
+    floor = SCALE_FLOOR * deviation.mean()
+    scale = np.maximum(deviation, floor if floor > 0.0 else 1.0)
+    return mean.astype(np.float32), scale.astype(np.float32)
+
+
+def _tensor(features: NDArray[np.float32]) -> Tensor:
+    """Turn (n, D) into a batch of one video, (1, D, n)."""
+    return torch.from_numpy(np.ascontiguousarray(features.T, dtype=np.float32))[None]
+
+
+def _check(videos: Sequence[LabelledVideo], n_labels: int) -> None:
+    if not videos:
+        raise ConfigError("There is no labelled video; a segmenter learns from one or more.")
+    width = videos[0].features.shape[1]
+    for video in videos:
+        if video.features.shape[1] != width:
+            raise ConfigError(
+                f"The video {video.name} has {video.features.shape[1]} features per frame, "
+                f"the video {videos[0].name} has {width}; they must agree."
+            )
+        if video.labels.min() < 0 or video.labels.max() >= n_labels:
+            raise ConfigError(
+                f"The video {video.name} has labels from {video.labels.min()} to "
+                f"{video.labels.max()}; there are labels 0 to {n_labels - 1}."
+            )

@@ -1,0 +1,74 @@
+"""How good the segments of a pool are, where their truth was logged."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from filtering.segmentation.metrics import (
+    OVERLAPS,
+    TOLERANCES,
+    LabelPair,
+    SegmentationScores,
+    segmentation_scores,
+)
+from filtering.segmentation.segments import Segmentation
+from teasim.pool import Episode
+from teasim.pool.types import index_from_spans
+
+UNSEEN = "unseen"
+"""Demonstrations whose labels the segmenter did not have: those that count."""
+LABELLED = "labelled"
+"""Demonstrations that the segmenter was fitted to."""
+
+
+def score_episodes(
+    episodes: Sequence[Episode], found: Segmentation
+) -> dict[str, SegmentationScores]:
+    """Return scores by UNSEEN and LABELLED; a part without known truth is left out.
+
+    Args:
+        episodes: the demonstrations that were segmented.
+        found: their segments.
+
+    Raises:
+        PoolError: logged spans are damaged.
+    """
+    parts: dict[str, list[LabelPair]] = {UNSEEN: [], LABELLED: []}
+    for number, episode in enumerate(episodes):
+        pair = _pair(episode, number, found)
+        if pair is not None:
+            parts[LABELLED if episode.demo_id in found.labelled else UNSEEN].append(pair)
+    return {part: segmentation_scores(pairs) for part, pairs in parts.items() if pairs}
+
+
+def scores_table(scores: dict[str, SegmentationScores]) -> str:
+    """Return the scores as lines of text, one per part, [%]."""
+    heads = ["videos", "accuracy", "edit"]
+    heads += [f"F1@{k}" for k in OVERLAPS] + [f"sub-tasks@{p}" for p in TOLERANCES]
+    width = max(map(len, ["", *scores])) + 2
+    lines = [" " * width + "  ".join(heads)]
+    for part, s in scores.items():
+        rates = [s.accuracy, s.edit, *s.f1.values(), *s.subtask_accuracy.values()]
+        cells = [str(s.videos), *(f"{rate:.1f}" for rate in rates)]
+        row = "  ".join(f"{cell:>{len(head)}}" for cell, head in zip(cells, heads, strict=True))
+        lines.append(f"{part:<{width}}{row}")
+    return "\n".join(lines)
+
+
+def scores_json(scores: dict[str, SegmentationScores]) -> dict[str, Any]:
+    """Return the scores as JSON holds them."""
+    return {part: asdict(s) for part, s in scores.items()}
+
+
+def _pair(episode: Episode, number: int, found: Segmentation) -> LabelPair | None:
+    """Return what demonstration `number` shows and what was found; None without logged truth."""
+    logged = episode.spans()
+    if not logged:
+        return None
+    names = tuple(dict.fromkeys([*found.subtasks, *(span.subtask for span in logged)]))
+    truth, predicted = (
+        index_from_spans(spans, names, episode.length) for spans in (logged, found.spans[number])
+    )
+    return LabelPair(np.asarray(truth), np.asarray(predicted))

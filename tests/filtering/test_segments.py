@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from filtering.segmentation.segments import decode, runs, spans_of
+from teasim.pool import Span
+
+
+def certain(labels: list[int], n_labels: int = 3, sure: float = 0.8) -> np.ndarray:
+    """Posteriors that favour these labels."""
+    posteriors = np.full((len(labels), n_labels), (1 - sure) / (n_labels - 1))
+    posteriors[np.arange(len(labels)), labels] = sure
+    return posteriors
+
+
+def test_runs():
+    assert runs(np.array([2, 2, 0, 2])) == [(2, 0, 2), (0, 2, 3), (2, 3, 4)]
+    assert runs(np.array([], dtype=int)) == []
+
+
+@given(st.lists(st.integers(0, 2), min_size=1, max_size=40))
+def test_without_a_least_length_each_frame_gets_its_most_probable_label(labels):
+    assert decode(certain(labels)).tolist() == labels
+
+
+@given(st.lists(st.integers(0, 2), min_size=1, max_size=40), st.integers(1, 10))
+def test_no_run_is_shorter_than_the_least_length_unless_it_is_the_only_one(labels, shortest):
+    found = runs(decode(certain(labels), shortest))
+    assert len(found) == 1 or min(run.length for run in found) >= shortest
+
+
+def test_a_short_run_goes_to_the_neighbour_that_explains_it_better():
+    posteriors = certain([0, 0, 0, 1, 2, 2, 2])
+    posteriors[3] = [0.3, 0.5, 0.2]
+    assert decode(posteriors, 2).tolist() == [0, 0, 0, 0, 2, 2, 2]
+    posteriors[3] = [0.2, 0.5, 0.3]
+    assert decode(posteriors, 2).tolist() == [0, 0, 0, 2, 2, 2, 2]
+
+
+def test_spans_leave_out_frames_of_no_subtask():
+    labels = np.array([2, 0, 0, 2, 1])
+    assert spans_of(labels, certain([2, 0, 0, 2, 1]), ("pour", "stir")) == (
+        Span("pour", 1, 3),
+        Span("stir", 4, 5),
+    )
+
+
+@pytest.mark.parametrize(("second", "name"), [(0.3, "stir"), (0.05, "pour")])
+def test_a_video_of_no_subtask_is_one_segment_of_the_likeliest(second, name):
+    posteriors = np.tile([0.1, second, 0.9 - second], (4, 1))
+    spans = spans_of(posteriors.argmax(axis=1), posteriors, ("pour", "stir"))
+    assert spans == (Span(name, 0, 4),)
