@@ -7,8 +7,7 @@ has VGG-16's grid (14 x 14 at 224 pixels), the network of the paper (section 3.2
 the time. Single precision and one thread: frames give the same bits in every process.
 """
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from filtering.determinism import one_thread
 from filtering.frames import Frames
 from filtering.pretrained import weights_path
 
@@ -38,17 +38,6 @@ TAPS = (10, 15)
 """Blocks that are looked at: stride 16 with 112 channels, and stride 32 with 320."""
 FRAME_FEATURES = 2 * (112 + 320)
 """Length of a frame's feature: average and maximum over the picture of both taps."""
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Run torch on one thread inside: sums get one order, and processes do not fight for cores."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
 
 
 def _relu6(images: Tensor) -> Tensor:

@@ -13,14 +13,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from filtering.determinism import one_thread, seeded
 from filtering.features.config import BottleneckConfig
-from filtering.features.training import (
-    class_labels,
-    one_thread,
-    predict_logits,
-    seeded,
-    train,
-)
+from filtering.features.training import class_labels, predict_logits, train
 from teasim.errors import ConfigError
 
 SCALE_FLOOR = 0.05

@@ -19,9 +19,10 @@ from torch import Tensor, nn
 from torch_geometric.data import Batch, Data
 from torch_geometric.nn import RGCNConv, global_add_pool
 
+from filtering.determinism import seeded
 from filtering.features.config import ClassifierConfig
 from filtering.features.relations import Relation
-from filtering.features.training import class_labels, predict_logits, seeded, train
+from filtering.features.training import class_labels, predict_logits, train
 
 
 class NodeLayer(nn.Module):

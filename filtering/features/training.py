@@ -1,7 +1,6 @@
 """How the networks of the features are trained: one thread, own random numbers, cross-entropy."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import torch
@@ -9,30 +8,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
+from filtering.determinism import one_thread
 from filtering.features.config import TrainingConfig
 from teasim.errors import ConfigError
 
 Forward = Callable[[Sequence[int]], Tensor]
 """Logits (b, T) of the clips with the given numbers."""
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Run torch on one thread inside: sums get one order, and workers do not fight for cores."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-@contextmanager
-def seeded(seed: int) -> Iterator[None]:
-    """Draw torch's random numbers from `seed` inside and leave the caller's where they were."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        yield
 
 
 def class_labels(labels: Sequence[int], clips: int) -> tuple[NDArray[np.int64], int]:

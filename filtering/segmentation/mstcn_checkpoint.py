@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import torch
 from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 
+from filtering.determinism import seeded
 from filtering.frame_features import FrameSource
 from filtering.pretrained import RECIPE, weights_digest
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape
@@ -73,7 +73,7 @@ def load_segmenter(folder: Path) -> MSTCNSegmenter:
 
 def _segmenter(description: Mapping[str, Any], weights: bytes) -> MSTCNSegmenter:
     subtasks = tuple(str(name) for name in description["subtasks"])
-    with torch.random.fork_rng(devices=[]):  # the random weights are thrown away at once
+    with seeded(0):  # the random weights are thrown away at once
         network = MSTCN(MSTCNShape(**description["network"]))
     if network.shape.labels - len(subtasks) not in (0, 1):
         raise ValueError("one label per sub-task, and at most one for none")

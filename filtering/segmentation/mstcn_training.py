@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from tqdm import tqdm
 
-from filtering.backbone import one_thread
+from filtering.determinism import one_thread, seeded
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape, mstcn_loss
 from filtering.segmentation.segments import runs
 from teasim.errors import ConfigError
@@ -141,9 +141,7 @@ class MSTCNLearner:
                 out of range.
         """
         _check(videos, n_labels)
-        # dropout and initial weights draw from torch's global generator: lend it a seed.
-        with one_thread(), torch.random.fork_rng(devices=[]):
-            torch.manual_seed(self.config.seed)
+        with one_thread(), seeded(self.config.seed):
             network = MSTCN(self.config.shape(videos[0].features.shape[1], n_labels))
             _standardise(network, [scaled(v.features, self.config.scaling) for v in videos])
             self.history_ = self._descend(network, videos)
