@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
@@ -50,6 +51,20 @@ def run(
         WorkerError: a process was killed from outside, most often for want of memory.
     """
     check_workers(jobs, backend)
+    # Workers whose memory has grown are renewed; their work goes on, so it is nobody's concern.
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
+        return _run(function, items, jobs, backend, description, progress)
+
+
+def _run(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    jobs: int,
+    backend: str,
+    description: str,
+    progress: bool | None,
+) -> list[Result]:
     show = sys.stderr.isatty() if progress is None else progress
     bar = tqdm(total=len(items), desc=description, disable=not show, file=sys.stderr, leave=False)
     with bar:
