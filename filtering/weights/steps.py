@@ -29,6 +29,21 @@ class StepList:
             raise ValueError("a segment has no frames")
 
 
+def steps_of_frames(labels: NDArray[np.int64]) -> StepList:
+    """Return the runs of equal labels (n,); negative ones are background and join what is around.
+
+    Raises:
+        ValueError: every frame is background.
+    """
+    kept = labels[labels >= 0]
+    if not len(kept):
+        raise ValueError("every frame is background")
+    edges = np.flatnonzero(np.diff(kept)) + 1
+    starts, stops = [0, *edges.tolist()], [*edges.tolist(), len(kept)]
+    lengths = tuple(stop - start for start, stop in zip(starts, stops, strict=True))
+    return StepList(tuple(kept[starts].tolist()), lengths)
+
+
 @dataclass(frozen=True)
 class StepCounts:
     """The counts of D demonstrations over T sub-tasks; START and END are label T of bigrams."""

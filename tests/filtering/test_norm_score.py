@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from filtering.weights.mixture import find_populations
 from filtering.weights.norm_score import score_steps, two_means
-from filtering.weights.steps import StepList, count_steps
+from filtering.weights.steps import StepList, count_steps, steps_of_frames
 from teasim.pool.leakage import auroc
 
 T = 7
@@ -119,3 +119,10 @@ def test_a_step_list_that_makes_no_sense_is_refused():
         StepList((0, 1), (3,))
     with pytest.raises(ValueError, match="has no frames"):
         StepList((0,), (0,))
+
+
+def test_frames_become_runs_and_background_joins_what_is_around():
+    found = steps_of_frames(np.array([-1, 2, 2, -1, 2, 0, 1, 1, -1]))
+    assert found == StepList((2, 0, 1), (3, 1, 2))
+    with pytest.raises(ValueError, match="every frame is background"):
+        steps_of_frames(np.array([-1, -1]))

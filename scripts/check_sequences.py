@@ -1,0 +1,141 @@
+"""Judge real people's annotated sequences by the default score, without reading which are wrong.
+
+FOLDER holds data sets in the MS-TCN form: 50salads (with predictions), captaincook4d and tea_unh,
+the latter two with labels.csv. A data set that is not there is left out.
+"""
+
+import argparse
+import csv
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from filtering.segmentation.mstcn_folder import MSTCNFolder
+from filtering.verdict import cut_of
+from filtering.weights.norm_score import score_steps
+from filtering.weights.steps import StepList, count_steps, steps_of_frames
+from teasim.pool.leakage import auroc
+
+DRESSING = ("add_oil", "add_vinegar", "add_salt", "add_pepper", "mix_dressing")
+"""What the paper removes from salads that begin with it (section 4.2)."""
+NO_STEPS = ("action_start", "action_end")
+VISIBLE = ("Missing Step", "Order Error")
+"""Errors that a list of steps can show."""
+
+CRITICAL = ("add_tea_bag", "add_water", "turn_off_oven")
+"""What the paper's Seq_3 leaves out."""
+
+Judged = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Losses (D,), flags (D,), truth (D,)."""
+
+
+def judge(demos: Sequence[StepList], wrong: Sequence[bool]) -> Judged:
+    """Score one pool."""
+    n_subtasks = 1 + max(max(demo.labels) for demo in demos)
+    losses = score_steps(count_steps(demos, n_subtasks)).losses
+    return losses, losses > cut_of(losses), np.array(wrong)
+
+
+def salads(root: Path, k: int, pools: int) -> Iterator[Judged]:
+    """Draw 10 cutting-first salads and k whose dressing is removed, as segmented by a network."""
+    folder = MSTCNFolder.open(root)
+    dressing = [folder.names.index(name) for name in DRESSING]
+    dropped = [folder.names.index(name) for name in NO_STEPS]
+    correct, wrong = [], []
+    for video in folder.videos:
+        truth, seen = folder.truth(video), folder.predictions(video)
+        assert truth is not None
+        begins = next(label for label in truth.tolist() if label not in dropped)
+        if begins in dressing:
+            seen = seen[~np.isin(truth, dressing)]
+        steps = steps_of_frames(np.where(np.isin(seen, dropped), -1, seen))
+        (wrong if begins in dressing else correct).append(steps)
+    for seed in range(pools):
+        rng = np.random.default_rng([k, seed])
+        good = rng.choice(len(correct), 10, replace=False)
+        bad = rng.choice(len(wrong), k, replace=False)
+        demos = [correct[index] for index in good] + [wrong[index] for index in bad]
+        yield judge(demos, [False] * 10 + [True] * k)
+
+
+def recipes(root: Path) -> Iterator[tuple[str, Judged]]:
+    """Judge every recipe of CaptainCook4D: missing steps and order errors against correct ones."""
+    for folder in sorted(path for path in root.iterdir() if path.is_dir()):
+        rows = [
+            row
+            for row in _labels(folder)
+            if row["correct"] == "1" or any(kind in row["errors"] for kind in VISIBLE)
+        ]
+        demos = [_steps(MSTCNFolder.open(folder), row["video"]) for row in rows]
+        yield folder.name, judge(demos, [row["correct"] == "0" for row in rows])
+
+
+def _labels(folder: Path) -> list[dict[str, str]]:
+    with (folder / "labels.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def _steps(folder: MSTCNFolder, video: str) -> StepList:
+    truth = folder.truth(video)
+    assert truth is not None
+    return steps_of_frames(truth)
+
+
+def teas(root: Path, k: int, pools: int) -> Iterator[Judged]:
+    """Draw 10 correct full-length teas and k of which one or two critical steps are deleted."""
+    folder = MSTCNFolder.open(root)
+    critical = [folder.names.index(name) for name in CRITICAL]
+    correct = [row["video"] for row in _labels(root) if row["correct"] == "1"]
+    full = [
+        video for video in correct if len(set(_steps(folder, video).labels)) >= len(folder.names)
+    ]
+    for seed in range(pools):
+        rng = np.random.default_rng([k, seed])
+        drawn = [_steps(folder, full[i]) for i in rng.choice(len(full), 10 + k, replace=False)]
+        for index in range(10, 10 + k):
+            drawn[index] = _without(drawn[index], rng.permutation(critical)[: 1 + seed % 2])
+        yield judge(drawn, [False] * 10 + [True] * k)
+
+
+def _without(demo: StepList, labels: np.ndarray) -> StepList:
+    kept = [k for k, label in enumerate(demo.labels) if label not in labels]
+    return StepList(tuple(demo.labels[k] for k in kept), tuple(demo.lengths[k] for k in kept))
+
+
+def main() -> int:
+    """Print one line per kind of pool."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="folder of the data sets")
+    parser.add_argument("--pools", type=int, default=100, help="random pools per row")
+    arguments = parser.parse_args()
+    root: Path = arguments.folder
+    if (root / "50salads").is_dir():
+        for k in (1, 2, 4, 6):
+            _print(f"50-Salads, predicted, 10 + {k}", salads(root / "50salads", k, arguments.pools))
+    if (root / "captaincook4d").is_dir():
+        found = list(recipes(root / "captaincook4d"))
+        for name, judged in found:
+            _print(f"CaptainCook4D, {name}", [judged])
+        _print("CaptainCook4D, all recipes", [judged for _, judged in found])
+    if (root / "tea_unh").is_dir():
+        for k in (1, 4, 8):
+            _print(f"UNH tea, deletions, 10 + {k}", teas(root / "tea_unh", k, arguments.pools))
+    return 0
+
+
+def _print(name: str, pools: Iterator[Judged] | Sequence[Judged]) -> None:
+    judged = list(pools)
+    area = np.mean([auroc(losses, wrong) for losses, _, wrong in judged])
+    right = np.mean([(flagged == wrong).mean() for _, flagged, wrong in judged])
+    recall = np.mean([flagged[wrong].mean() for _, flagged, wrong in judged])
+    false = np.mean([flagged[~wrong].sum() for _, flagged, wrong in judged])
+    print(
+        f"{name:40} AUROC {area:.3f}  accuracy {100 * right:5.1f} %  recall {100 * recall:5.1f} %"
+        f"  falsely flagged {false:.2f}"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
