@@ -10,7 +10,7 @@ from teasim.errors import ConfigError, SkillError
 from teasim.skills.arm import Style
 from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform
-from teasim.skills.pace import Pace
+from teasim.skills.pace import Pace, idle
 from teasim.task.mistakes import Plan
 from teasim.world.simulation import Simulation
 from teasim.world.station import sample_layout
@@ -58,14 +58,17 @@ def demonstrate(
     for position, subtask in enumerate(plan.steps):
         elapsed = float(simulation.data.time)
         rest = pace.rest(position, elapsed, style) if pace else 0.0
-        yield from _rest(simulation, subtask, position, rest)
+        yield from _rest(simulation, subtask, position, rest, rng)
         now = varied(style, rng, participant)
         for target in perform(subtask, simulation, now, plan.manner(position)):
             yield from _advance(simulation, subtask, position, target)
     rest = pace.length - float(simulation.data.time) if pace else FINAL_REST
     if rest < FINAL_REST - CONTROL_TIMESTEP:
         raise SkillError(f"The demonstration took {FINAL_REST - rest:.1f} s longer than it may.")
-    yield from _rest(simulation, plan.steps[-1], len(plan.steps) - 1, rest)
+    last = len(plan.steps) - 1
+    yield from _rest(simulation, plan.steps[last], last, rest - FINAL_REST, rng)
+    for _ in range(round(FINAL_REST / CONTROL_TIMESTEP)):
+        yield from _advance(simulation, plan.steps[last], last, simulation.target)
 
 
 def _take_place(simulation: Simulation, participant: Participant) -> None:
@@ -78,9 +81,15 @@ def _take_place(simulation: Simulation, participant: Participant) -> None:
         simulation.dress(participant.appearance)
 
 
-def _rest(simulation: Simulation, subtask: str, position: int, seconds: float) -> Iterator[Step]:
-    for _ in range(round(seconds / CONTROL_TIMESTEP)):
-        yield from _advance(simulation, subtask, position, simulation.target)
+def _rest(
+    simulation: Simulation,
+    subtask: str,
+    position: int,
+    seconds: float,
+    rng: np.random.Generator,
+) -> Iterator[Step]:
+    for target in idle(simulation, seconds, rng):
+        yield from _advance(simulation, subtask, position, target)
 
 
 def _advance(

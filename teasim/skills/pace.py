@@ -1,11 +1,13 @@
 """How a demonstration is drawn out to a length that says nothing about what was done in it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
+from teasim.constants import ARMS, CONTROL_TIMESTEP
 from teasim.skills.arm import Style
+from teasim.world.simulation import Simulation
 
 STRETCH = (1.3, 1.5)
 """Length-matched demonstrations last uniformly between these, in typical lengths of Seq_1."""
@@ -33,6 +35,31 @@ TYPICAL_SECONDS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     }
 )
 """What a sub-task takes each embodiment at the default tempo [s]."""
+
+
+IDLE_REACH = 0.4
+"""How far an idle arm sways, in units of the embodiment's `bow` [rad or m]."""
+IDLE_PERIOD = 2.5
+"""Time an idle arm takes to sway out and back [s], roughly."""
+
+
+def idle(simulation: Simulation, seconds: float, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    """Targets of somebody who waits for `seconds`: both arms sway to the sides.
+
+    Nobody who is drawn out to a length stands still: resting would show as little motion, and
+    little motion would tell how much was left out.
+    """
+    steps = round(seconds / CONTROL_TIMESTEP)
+    sways = max(round(seconds / IDLE_PERIOD), 1)
+    start, bow = simulation.target.copy(), simulation.embodiment.bow
+    reach = IDLE_REACH * rng.uniform(0.7, 1.3, size=(len(ARMS), 1)) * rng.choice([-1, 1], (2, 1))
+    for step in range(1, steps + 1):
+        turns = sways * step / steps
+        side = 1 if int(np.ceil(turns)) % 2 else -1  # to one side, then to the other
+        out = side * (1 - np.cos(2 * np.pi * turns)) / 2
+        target = start.copy()
+        target[: -len(ARMS)] += (out * reach * bow).ravel()
+        yield target
 
 
 class Pace:
