@@ -10,6 +10,10 @@ from teasim.world.person import HAND_RANGE, POINTING_DOWN
 _AXES = np.eye(3)
 
 
+ROUNDING = 1e-9
+"""A solution may be this far outside of the planning limits [m, rad]."""
+
+
 class HandKinematics:
     """Forward and inverse kinematics of one hand at its tool centre point.
 
@@ -45,7 +49,8 @@ class HandKinematics:
         )
         turns += 2 * np.pi * np.round((seed[3:] - turns) / (2 * np.pi))
         joints = np.concatenate([position(goal), turns])
-        if (joints < HAND_RANGE[:, 0]).any() or (joints > HAND_RANGE[:, 1]).any():
+        low, high = HAND_RANGE.T
+        if (joints < low - ROUNDING).any() or (joints > high + ROUNDING).any():
             x, y, z = position(goal)
             raise SkillError(
                 f"The {self._arm} hand cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m in the wanted "
