@@ -26,7 +26,7 @@ class GenerationError(TeasimError):
 
 
 class CheckpointError(TeasimError):
-    """A saved policy is missing, damaged, or was made for another observation or action space."""
+    """Saved weights are missing, damaged, or were made for something else than they are used for."""
 
 
 class WorkerError(TeasimError):
