@@ -14,6 +14,7 @@ from filtering.background import subtraction_named
 from filtering.explain import Finding, explain, find_strange_steps
 from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
+from filtering.frames import chosen_cameras
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.sequence import transitions
@@ -132,7 +133,7 @@ class DemoFilter:
         config = self.config
         self.timings_ = {}
         self._check(pool)
-        self.cameras_ = _chosen_cameras(pool, config.cameras)
+        self.cameras_ = chosen_cameras(pool, config.cameras) or (_main_camera(pool),)
         with self._timed("segments"):
             self.segments_ = segmenter_named(config.segmenter)(pool, jobs=jobs)
         with self._timed("features"):
@@ -220,14 +221,5 @@ class DemoFilter:
         self.timings_[stage] = time.perf_counter() - start
 
 
-def _chosen_cameras(pool: Pool, cameras: tuple[str, ...]) -> tuple[str, ...]:
-    if not pool.cameras:
-        raise ConfigError(f"The pool '{pool.root}' has no videos to look at.")
-    if not cameras:
-        return (MAIN_CAMERA if MAIN_CAMERA in pool.cameras else pool.cameras[0],)
-    unknown = [camera for camera in cameras if camera not in pool.cameras]
-    if unknown:
-        raise ConfigError(
-            f"The pool has no camera '{unknown[0]}'; choose from {', '.join(pool.cameras)}."
-        )
-    return cameras
+def _main_camera(pool: Pool) -> str:
+    return MAIN_CAMERA if MAIN_CAMERA in pool.cameras else pool.cameras[0]

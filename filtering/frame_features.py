@@ -2,10 +2,10 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,17 @@ class FrameTask:
     """Folder of the feature cache."""
 
 
+class Cached(Protocol):
+    """Something that is done once and kept."""
+
+    @property
+    def cache_folder(self) -> Path:
+        """Folder of the feature cache."""
+
+
+Task = TypeVar("Task", bound=Cached)
+
+
 def sample_count(length: int, fps: float, rate: float) -> int:
     """Return at how many moments a video of `length` frames is looked at, 1..length."""
     return min(length, max(1, round(length * rate / fps)))
@@ -95,25 +106,32 @@ def frame_features(
         for episode in episodes
         for camera in source.cameras
     ]
-    described = _look_up_or_describe(tasks, jobs)
-    width = len(source.cameras)
-    return [
-        np.hstack(described[first : first + width]) for first in range(0, len(described), width)
-    ]
+    described = look_up_or_describe(tasks, _key, describe_moments, jobs)
+    return side_by_side(described, len(source.cameras))
 
 
-def _look_up_or_describe(tasks: Sequence[FrameTask], jobs: int) -> list[NDArray[np.float32]]:
-    """Return (n, F) per video; workers start only for those that are not in the cache."""
-    known = {n: ArrayCache(task.cache_folder).get(_key(task)) for n, task in enumerate(tasks)}
+def look_up_or_describe(
+    tasks: Sequence[Task],
+    key: Callable[[Task], str],
+    describe: Callable[[Task], NDArray[np.float32]],
+    jobs: int,
+) -> list[NDArray[np.float32]]:
+    """Return what `describe` gives for each task; workers start only for what is not cached."""
+    known = {n: ArrayCache(task.cache_folder).get(key(task)) for n, task in enumerate(tasks)}
     unknown = [number for number, features in known.items() if features is None]
     computed = parallel.run(
-        describe_moments,
+        describe,
         [tasks[number] for number in unknown],
         jobs=jobs,
         description="looking at videos",
     )
     known.update(zip(unknown, computed, strict=True))
     return [features for features in known.values() if features is not None]
+
+
+def side_by_side(videos: Sequence[NDArray[np.float32]], width: int) -> list[NDArray[np.float32]]:
+    """Join every `width` consecutive videos (n, F), the cameras of one demonstration."""
+    return [np.hstack(videos[first : first + width]) for first in range(0, len(videos), width)]
 
 
 def describe_moments(task: FrameTask) -> NDArray[np.float32]:

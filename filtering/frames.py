@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from teasim.pool import Span
+from teasim.errors import ConfigError
+from teasim.pool import Pool, Span
 
 LARGEST_SIDE = 224
 """Frames whose shorter side is longer are area-averaged down to it [pixels]; the backbone was
@@ -40,3 +41,19 @@ def fit_size(frames: Frames) -> Frames:
 
     size = (round(width * scale), round(height * scale))
     return np.stack([cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in frames])
+
+
+def chosen_cameras(pool: Pool, wanted: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the cameras `wanted` of a pool; empty when none is named.
+
+    Raises:
+        ConfigError: the pool has no videos, or no camera of a name.
+    """
+    if not pool.cameras:
+        raise ConfigError(f"The pool '{pool.root}' has no videos to look at.")
+    for camera in wanted:
+        if camera not in pool.cameras:
+            raise ConfigError(
+                f"The pool has no camera '{camera}'; choose from {', '.join(pool.cameras)}."
+            )
+    return wanted

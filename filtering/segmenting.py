@@ -14,6 +14,7 @@ from filtering.frame_features import (
     frame_features,
     sampled_frames,
 )
+from filtering.frames import chosen_cameras
 from filtering.segmentation.metrics import LabelPair, SegmentationScores, segmentation_scores
 from filtering.segmentation.mstcn_checkpoint import load_segmenter, save_segmenter
 from filtering.segmentation.mstcn_folder import (
@@ -82,7 +83,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
     """
     pool = Pool.open(source)
     check_new_folder(out)
-    frames = FrameSource(_cameras(pool, config.cameras), config.rate)
+    frames = FrameSource(chosen_cameras(pool, config.cameras) or pool.cameras, config.rate)
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
     began = time.perf_counter()
@@ -169,17 +170,6 @@ def _predict_folder(segmenter: MSTCNSegmenter, folder: MSTCNFolder, out: Path) -
             pairs.append(LabelPair(truth[video], predicted[video]))
     write_predictions(out, names, predicted, truth, posteriors)
     return {UNSEEN: segmentation_scores(pairs)} if pairs else {}
-
-
-def _cameras(pool: Pool, cameras: tuple[str, ...]) -> tuple[str, ...]:
-    if not pool.cameras:
-        raise ConfigError(f"The pool '{pool.root}' has no videos to look at.")
-    for camera in cameras:
-        if camera not in pool.cameras:
-            raise ConfigError(
-                f"The pool has no camera '{camera}'; choose from {', '.join(pool.cameras)}."
-            )
-    return cameras or pool.cameras
 
 
 def _divide(pool: Pool, config: FitConfig) -> tuple[list[Episode], list[Episode]]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.thresholds import Grouping, group_weights
-from filtering.weights.norm_score import score_steps, two_means
+from filtering.weights.norm_score import near_and_far, score_steps
 from filtering.weights.score import Score
 from filtering.weights.steps import Array, StepCounts
 from teasim.errors import ConfigError
@@ -58,9 +58,7 @@ def by_equation_3(counts: StepCounts, surprises: Score, groups: str) -> Verdict:
 
 def cut_of(losses: NDArray[np.float64]) -> float:
     """Loss above which a demonstration is flagged [nats], for losses (D,)."""
-    roots = np.sqrt(np.maximum(losses, 0))
-    edge = two_means(roots)
-    low, high = roots[roots <= edge], roots[roots > edge]
+    low, high = near_and_far(losses)
     if not len(high):
         return SMALLEST_CUT
     between = low.mean() + CUT_SHARE * (high.mean() - low.mean())

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from filtering.background import subtraction_named
 from filtering.cache import ArrayCache, default_folder
-from filtering.frame_features import clip_key
+from filtering.frame_features import clip_key, look_up_or_describe, side_by_side
 from filtering.frames import fit_size, segment_indices, uniform_indices
-from teasim import parallel
 from teasim.pool import Pool, Span, VideoClip, read_frames
 
 OVERVIEW = 31
@@ -62,30 +61,9 @@ def segment_features(
         for episode, spans in zip(pool.episodes, segments, strict=True)
         for camera in cameras
     ]
-    described = _over_time(tasks, jobs)
-    return [
-        np.hstack(described[first : first + len(cameras)])
-        for first in range(0, len(described), len(cameras))
-    ]
-
-
-def _over_time(tasks: Sequence[VideoTask], jobs: int) -> list[NDArray[np.float32]]:
-    """Return (q, 2 * FRAME_FEATURES) per video; workers start only for those not in the cache."""
-    frames = [ArrayCache(task.cache_folder).get(_key(task)) for task in tasks]
-    unknown = [number for number, known in enumerate(frames) if known is None]
-    computed = parallel.run(
-        describe_video,
-        [tasks[number] for number in unknown],
-        jobs=jobs,
-        description="looking at videos",
-    )
-    for number, features in zip(unknown, computed, strict=True):
-        frames[number] = features
-    return [
-        pool_over_time(task, features)
-        for task, features in zip(tasks, frames, strict=True)
-        if features is not None
-    ]
+    frames = look_up_or_describe(tasks, _key, describe_video, jobs)
+    described = [pool_over_time(task, found) for task, found in zip(tasks, frames, strict=True)]
+    return side_by_side(described, len(cameras))
 
 
 def describe_video(task: VideoTask) -> NDArray[np.float32]:

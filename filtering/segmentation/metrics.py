@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.segmentation.segments import Run, runs
-from teasim.pool.types import NO_SUBTASK
+from teasim.pool.types import NO_SUBTASK, Run, runs
 
 OVERLAPS = (10, 25, 50)
 """Least intersection over union of a hit [%]."""

@@ -18,8 +18,8 @@ from tqdm import tqdm
 
 from filtering.determinism import one_thread, seeded
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape, mstcn_loss
-from filtering.segmentation.segments import runs
 from teasim.errors import ConfigError
+from teasim.pool.types import runs
 
 SCALINGS = ("video", "training")
 """What features are centred and scaled by before the training set's own moments."""

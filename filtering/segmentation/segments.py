@@ -1,13 +1,13 @@
 """What a segmenter returns, and how frame posteriors become segments."""
 
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from teasim.pool import Pool, Span
+from teasim.pool.types import runs
 
 TINY = 1e-12
 """Least posterior whose logarithm is taken."""
@@ -40,27 +40,6 @@ class Segmenter(Protocol):
 
     def __call__(self, pool: Pool, *, jobs: int = 1) -> Segmentation:
         """Return them in the order of `pool.episodes`; they do not depend on `jobs`."""
-
-
-class Run(NamedTuple):
-    """Frames start <= frame < stop with one label."""
-
-    label: int
-    start: int
-    stop: int
-
-    @property
-    def length(self) -> int:
-        """Number of frames."""
-        return self.stop - self.start
-
-
-def runs(labels: NDArray[np.integer]) -> list[Run]:
-    """Return the runs of equal labels (n,) in order of time; none for n = 0."""
-    if not len(labels):
-        return []
-    edges = [0, *(np.flatnonzero(np.diff(labels)) + 1).tolist(), len(labels)]
-    return [Run(int(labels[start]), start, stop) for start, stop in pairwise(edges)]
 
 
 def decode(posteriors: NDArray[np.floating], shortest: int = 1) -> NDArray[np.int64]:

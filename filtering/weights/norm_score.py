@@ -114,27 +114,37 @@ def _trim(losses: Array) -> Array:
 
 def _refit(losses: Array, trimmed: Array) -> Array:
     """Trust all that are near to the better half: the lower of two clusters of sqrt(l)."""
-    roots = np.sqrt(np.maximum(losses, 0))
-    cut = two_means(roots)
-    low = roots[roots <= cut]
-    high = roots[roots > cut]
+    low, high = near_and_far(losses)
     if not len(high):
         return trimmed
     middle = (low.mean() + high.mean()) / 2
     residuals = np.concatenate([low - low.mean(), high - high.mean()])
     spread = max(0.5 * float(residuals.std()), 1e-3)
-    trust = np.asarray(expit((middle - roots) / spread))
+    trust = np.asarray(expit((middle - _roots(losses)) / spread))
     return trust if trust.sum() >= len(losses) / 2 else trimmed
+
+
+def near_and_far(losses: Array) -> tuple[Array, Array]:
+    """Return sqrt(l) of the lower and of the upper cluster; the upper one may be empty."""
+    roots = _roots(losses)
+    edge = two_means(roots)
+    return roots[roots <= edge], roots[roots > edge]
+
+
+def _roots(losses: Array) -> Array:
+    return np.asarray(np.sqrt(np.maximum(losses, 0)))
 
 
 def two_means(values: Array) -> float:
     """Largest value of the lower cluster in the exact two-means split of `values` (n,)."""
     ordered = np.sort(values)
-    splits = [
-        ((ordered[:k] - ordered[:k].mean()) ** 2).sum()
-        + ((ordered[k:] - ordered[k:].mean()) ** 2).sum()
+    splits = {
+        k: _within(ordered[:k]) + _within(ordered[k:])
         for k in range(1, len(ordered))
         if ordered[k] > ordered[k - 1]
-    ]
-    places = [k for k in range(1, len(ordered)) if ordered[k] > ordered[k - 1]]
-    return float(ordered[places[int(np.argmin(splits))] - 1]) if places else float(ordered[-1])
+    }
+    return float(ordered[min(splits, key=splits.__getitem__) - 1 if splits else -1])
+
+
+def _within(values: Array) -> float:
+    return float(((values - values.mean()) ** 2).sum())

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from teasim.pool.types import runs
+
 Array = NDArray[np.float64]
 
 
@@ -38,10 +40,8 @@ def steps_of_frames(labels: NDArray[np.int64]) -> StepList:
     kept = labels[labels >= 0]
     if not len(kept):
         raise ValueError("every frame is background")
-    edges = np.flatnonzero(np.diff(kept)) + 1
-    starts, stops = [0, *edges.tolist()], [*edges.tolist(), len(kept)]
-    lengths = tuple(stop - start for start, stop in zip(starts, stops, strict=True))
-    return StepList(tuple(kept[starts].tolist()), lengths)
+    found = runs(kept)
+    return StepList(tuple(run.label for run in found), tuple(run.length for run in found))
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -140,19 +140,35 @@ class PoolHeader:
         return restored
 
 
+class Run(NamedTuple):
+    """Frames start <= frame < stop with one label."""
+
+    label: int
+    start: int
+    stop: int
+
+    @property
+    def length(self) -> int:
+        """Number of frames."""
+        return self.stop - self.start
+
+
+def runs(labels: np.ndarray) -> list[Run]:
+    """Return the runs of equal labels (n,) in order of time; none for n = 0."""
+    if not len(labels):
+        return []
+    edges = [0, *(np.flatnonzero(np.diff(labels)) + 1).tolist(), len(labels)]
+    return [Run(int(labels[start]), start, stop) for start, stop in pairwise(edges)]
+
+
 def spans_from_index(subtask_index: np.ndarray, subtasks: Sequence[str]) -> tuple[Span, ...]:
     """Runs of equal `subtask_index` (n,) as spans; frames without a sub-task belong to none.
 
     Raises:
         PoolError: An index has no name in `subtasks`.
     """
-    if not len(subtask_index):
-        return ()
-    changes = np.flatnonzero(np.diff(subtask_index)) + 1
-    edges = [0, *changes.tolist(), len(subtask_index)]
     spans = []
-    for start, stop in pairwise(edges):
-        index = int(subtask_index[start])
+    for index, start, stop in runs(subtask_index):
         if index == NO_SUBTASK:
             continue
         if not 0 <= index < len(subtasks):

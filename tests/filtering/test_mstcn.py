@@ -22,8 +22,8 @@ from filtering.segmentation.mstcn_training import (
     rearrange,
     scaled,
 )
-from filtering.segmentation.segments import runs
 from teasim.errors import ConfigError
+from teasim.pool.types import runs
 
 SMALL = MSTCNConfig(
     epochs=40,

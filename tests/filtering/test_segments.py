@@ -3,8 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtering.segmentation.segments import decode, runs, spans_of
+from filtering.segmentation.segments import decode, spans_of
 from teasim.pool import Span
+from teasim.pool.types import runs
 
 
 def certain(labels: list[int], n_labels: int = 3, sure: float = 0.8) -> np.ndarray:
