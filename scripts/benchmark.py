@@ -28,7 +28,8 @@ from teasim.constants import (
     STEPS_PER_UPDATE,
     UPDATES_PER_CONTROL,
 )
-from teasim.generate import GenerateConfig, generate_demo, plan_pool
+from teasim.generate import GenerateConfig, demo_rng, plan_pool
+from teasim.generate.recording import generate_demo
 from teasim.pool.videos import VideoWriter
 from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
@@ -116,8 +117,7 @@ def generation(size: int, repeats: int) -> dict[str, float]:
     config = GenerateConfig(seq1=1, size=size)
     (demo,) = plan_pool(config)
     simulation = Simulation()
-    rng = np.random.default_rng([config.seed, 1, demo.index, 0])
-    recorded = demonstrate(simulation, demo.plan, rng)
+    recorded = demonstrate(simulation, demo.plan, demo_rng(config.seed, demo.index))
     next(recorded)  # the station has come to rest
     recording = Recording.of(simulation)
     for _ in recorded:

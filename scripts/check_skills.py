@@ -26,7 +26,6 @@ from teasim.task.recipes import (
     SUBOPTIMAL,
     random_order,
 )
-from teasim.task.scoring import spills
 from teasim.world.monitor import PENETRATION_LIMIT, TCP_SPEED_LIMIT, Monitor, Pair
 from teasim.world.simulation import Simulation
 
@@ -43,8 +42,6 @@ class Report:
     """Why not, or nothing."""
     spilled: float
     """Amount on the table [ml or g]."""
-    spoiled: tuple[str, ...]
-    """Contents of which more than the tolerance was spilled."""
     joint_speed: float
     """Largest joint speed as a share of its limit."""
     tcp_speed: float
@@ -60,7 +57,6 @@ class Report:
     def complaints(self) -> list[str]:
         """Everything that is not as it should be."""
         found = [] if self.as_planned else [self.what]
-        found += self.spoiled
         found += [f"{first} touches {second}" for first, second in self.forbidden]
         if self.joint_speed > 1:
             found.append(f"a joint at {self.joint_speed:.0%} of its speed")
@@ -93,14 +89,11 @@ def check(arguments: argparse.Namespace, seed: int) -> Report:
         what = mismatch(demo, simulation)
     except SkillError as error:
         what = str(error)
-    missed = {f"spilled_{name.removeprefix('add_')}" for name in demo.plan.spilled}
-    spilled = simulation.liquids.spilled
     return Report(
         seed=seed,
         as_planned=not what,
         what=f"{', '.join(demo.plan.steps)}: {what}",
-        spilled=sum(spilled.values()),
-        spoiled=tuple(word for word in spills(spilled) if word not in missed),
+        spilled=sum(simulation.liquids.spilled.values()),
         joint_speed=monitor.joint_speed,
         tcp_speed=monitor.tcp_speed,
         penetration=monitor.penetration,

@@ -26,7 +26,7 @@ class GenerationError(TeasimError):
 
 
 class CheckpointError(TeasimError):
-    """Saved weights are missing, damaged, or were made for something else than they are used for."""
+    """Saved weights are missing, damaged, or made for something else than they are used for."""
 
 
 class WorkerError(TeasimError):

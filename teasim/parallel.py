@@ -51,23 +51,11 @@ def run(
         WorkerError: a process was killed from outside, most often for want of memory.
     """
     check_workers(jobs, backend)
-    # Workers whose memory has grown are renewed; their work goes on, so it is nobody's concern.
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
-        return _run(function, items, jobs, backend, description, progress)
-
-
-def _run(
-    function: Callable[[Item], Result],
-    items: Sequence[Item],
-    jobs: int,
-    backend: str,
-    description: str,
-    progress: bool | None,
-) -> list[Result]:
     show = sys.stderr.isatty() if progress is None else progress
     bar = tqdm(total=len(items), desc=description, disable=not show, file=sys.stderr, leave=False)
-    with bar:
+    with bar, warnings.catch_warnings():
+        # Workers whose memory has grown are renewed; their work goes on, so it is no concern.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
         results = []
         try:
             for result in _results(function, items, jobs, backend):

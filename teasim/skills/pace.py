@@ -50,6 +50,8 @@ def idle(simulation: Simulation, seconds: float, rng: np.random.Generator) -> It
     little motion would tell how much was left out.
     """
     steps = round(seconds / CONTROL_TIMESTEP)
+    if not steps:
+        return  # and nothing is drawn: without a length to match, a seed gives what it always gave
     sways = max(round(seconds / IDLE_PERIOD), 1)
     start, bow = simulation.target.copy(), simulation.embodiment.bow
     reach = IDLE_REACH * rng.uniform(0.7, 1.3, size=(len(ARMS), 1)) * rng.choice([-1, 1], (2, 1))

@@ -93,7 +93,7 @@ def skip(plan: Plan, rng: np.random.Generator, subtask: str | None = None) -> Pl
     Raises:
         ConfigError: there is no such sub-task, or nothing is left to skip.
     """
-    position = _choose("skip", plan, rng, subtask, CRITICAL)
+    position = _choose("skip", plan, rng, subtask, CRITICAL, by_name=plan.steps)
     missing = plan.steps[position]
     steps = plan.steps[:position] + plan.steps[position + 1 :]
     shifted = _shifted(plan.mistakes, position, -1)
@@ -207,10 +207,15 @@ def _choose(
     rng: np.random.Generator,
     subtask: str | None,
     choices: tuple[str, ...],
+    by_name: tuple[str, ...] | None = None,
 ) -> int:
-    """Position of `subtask`, or of a random one of `choices`, among the steps still free."""
+    """Position of `subtask`, or of a random one of `choices`, among the steps still free.
+
+    `by_name` are the sub-tasks that can be asked for, where they are more than the `choices`.
+    """
     if subtask is not None:
-        possible = _possible(kind, plan)
+        wanted = dict.fromkeys(choices if by_name is None else by_name)
+        possible = [name for name in wanted if plan.free((name,))]
         if check_subtask(subtask) not in possible:
             raise ConfigError(
                 f"The mistake '{kind}' cannot be made at '{subtask}' in this plan; "
@@ -226,16 +231,6 @@ def _choose(
     return positions[rng.integers(len(positions))]
 
 
-def _possible(kind: str, plan: Plan) -> list[str]:
-    """Sub-tasks of the plan at which a mistake can be made when it is asked for by name."""
-    names = {
-        "wrong_order": _broken(plan),
-        "repeat": [name for name in plan.steps if name != "add_tea_bag"],
-        "wrong_object": list(POURED),
-    }.get(kind, list(plan.steps))
-    return [name for name in dict.fromkeys(names) if plan.free((name,))]
-
-
 def _broken(plan: Plan) -> list[str]:
     """Sub-tasks that wait for something which stands free before them in the plan."""
     return [
@@ -247,8 +242,8 @@ def _broken(plan: Plan) -> list[str]:
 
 def _in_manner(manner: Manner, plan: Plan, rng: np.random.Generator, subtask: str | None) -> Plan:
     # What would have no effect anyway (turning off what is off) shows nothing of the mistake.
-    telling = tuple(name for name in plan.steps if name in plan.outcome)
-    position = _choose(manner, plan, rng, subtask, telling)
+    telling = tuple(dict.fromkeys(plan.outcome))
+    position = _choose(manner, plan, rng, subtask, telling, by_name=plan.steps)
     made = PlannedMistake(manner, plan.steps[position], position)
     return Plan(plan.steps, (*plan.mistakes, made))
 

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARMS, assets_folder
-from teasim.world.yumi import CONTACT_BITS
+from teasim.world.yumi import set_contacts
 
 HAND_JOINTS = {
     arm: tuple(f"{arm}_{name}" for name in ("x", "y", "z", "roll", "pitch", "yaw")) for arm in ARMS
@@ -88,10 +88,7 @@ def wear(model: mujoco.MjModel, appearance: Appearance) -> None:
 def hand_spec(arm: str) -> mujoco.MjSpec:
     """Model of one hand; what is seen of a left one is the right one's mirror image."""
     spec = mujoco.MjSpec.from_file(str(assets_folder() / "person" / "hand.xml"))
-    contype, conaffinity = CONTACT_BITS[arm]
-    for geom in spec.geoms:
-        if geom.group == 3:
-            geom.contype, geom.conaffinity = contype, conaffinity
+    set_contacts(spec, arm)
     if arm == "left":
         for geom in spec.geoms:
             geom.pos[1] *= -1

@@ -32,19 +32,24 @@ JOINT_SPEEDS = np.radians((180, 180, 180, 180, 400, 400, 400))
 FINGER_SPEED = 0.025
 """Speed of each finger [m/s] (ABB servo gripper, default setting)."""
 
-CONTACT_BITS = {"right": (2, 1 | 4), "left": (4, 1 | 2)}
-"""Bits of contype and conaffinity per side. Each arm meets everything but itself: its own links are
-kept apart by the joint limits, and hull contacts between neighbours would be false."""
+# Bits of contype and conaffinity. Each arm meets everything but itself: its own links are kept
+# apart by the joint limits, and hull contacts between neighbours would be false.
+_CONTACT_BITS = {"right": (2, 1 | 4), "left": (4, 1 | 2)}
 
 
 def arm_spec(arm: str) -> mujoco.MjSpec:
     """Model of one arm, its contacts set up for the `arm` side ("right" or "left")."""
     spec = mujoco.MjSpec.from_file(str(assets_folder() / "abb_yumi" / "arm.xml"))
-    contype, conaffinity = CONTACT_BITS[arm]
+    set_contacts(spec, arm)
+    return spec
+
+
+def set_contacts(spec: mujoco.MjSpec, arm: str) -> None:
+    """Let the collision shapes (group 3) of an arm or a hand meet everything but its own side."""
+    contype, conaffinity = _CONTACT_BITS[arm]
     for geom in spec.geoms:
         if geom.group == 3:
             geom.contype, geom.conaffinity = contype, conaffinity
-    return spec
 
 
 def mount_yumi(spec: mujoco.MjSpec, arms: tuple[str, ...] = ARMS) -> None:

@@ -163,8 +163,6 @@ def test_logs_are_what_a_policy_can_be_trained_on(pool):
         assert np.isfinite(state).all()
         # Each action is the target of the coming step, so the next state is near to it.
         arms = slice(0, 14)
-        behind = np.abs(state[1:, arms] - action[:-1, arms])
-        assert np.quantile(behind, 0.999) < 0.03
-        assert behind.max() < 0.15  # for a frame, where a wrist turns suddenly
+        assert np.abs(state[1:, arms] - action[:-1, arms]).max() < 0.03
         for span in episode.spans():
             assert state[span.start, arms] == pytest.approx(state[0, arms], abs=0.01)
