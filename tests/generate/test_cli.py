@@ -8,6 +8,7 @@ import pytest
 
 import teasim.generate
 from teasim.cli.main import main
+from teasim.errors import RenderError
 from teasim.generate import recording
 from teasim.task.mistakes import MISTAKES
 from tests.generate.test_pool import SHORT, digests
@@ -91,3 +92,13 @@ def test_help_comes_without_a_simulator():
         "assert not {'mujoco', 'torch'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True, capture_output=True)
+
+
+def test_without_opengl_nothing_is_begun(tmp_path, capsys, monkeypatch):
+    def missing():
+        raise RenderError("No headless OpenGL back end works.")
+
+    monkeypatch.setattr(teasim.generate, "choose_gl", missing)
+    assert main(["generate", str(tmp_path / "pool"), "--seq1", "1"]) == 2
+    assert capsys.readouterr().err == "teasim: No headless OpenGL back end works.\n"
+    assert list(tmp_path.iterdir()) == []

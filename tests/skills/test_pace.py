@@ -63,3 +63,11 @@ def test_a_short_plan_takes_as_long_as_it_is_meant_to():
     typical = sum(TYPICAL_SECONDS["yumi"].values())
     assert STRETCH[0] * typical - 0.2 <= len(steps) / 10 <= STRETCH[1] * typical + 0.2
     assert simulation.subtasks_done == plan.steps
+
+
+def test_a_rest_of_no_length_draws_nothing():
+    simulation = Simulation()
+    simulation.reset(nominal_layout())
+    rng, untouched = np.random.default_rng(0), np.random.default_rng(0)
+    assert list(idle(simulation, 0.0, rng)) == []
+    assert rng.random() == untouched.random()
