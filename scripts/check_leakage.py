@@ -27,6 +27,7 @@ def main() -> int:
     parser.add_argument("--correct", type=int, default=10, help="correct demonstrations in each")
     parser.add_argument("--each", type=int, default=1, help="of every kind of mistake in each")
     parser.add_argument("--size", type=int, default=224, help="side of the videos [pixels]")
+    parser.add_argument("--cameras", nargs="+", default=["left"], help="cameras that film")
     parser.add_argument("--jobs", type=int, default=default_jobs(), help="processes")
     arguments = parser.parse_args()
     found = [leakage(_pool(arguments, seed)) for seed in range(arguments.pools)]
@@ -45,7 +46,7 @@ def _pool(arguments: argparse.Namespace, seed: int) -> Pool:
         seq1=arguments.correct,
         mistakes=tuple((name, arguments.each) for name in MISTAKES),
         match_length=True,
-        cameras=("left",),
+        cameras=tuple(arguments.cameras),
         size=arguments.size,
         seed=seed,
     )
