@@ -87,7 +87,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
     began = time.perf_counter()
-    videos = _labelled_videos(pool, chosen, subtasks, frames, jobs)
+    videos = labelled_videos(pool, chosen, subtasks, frames, jobs)
     # Frames of no sub-task, where there are any, are one more label, the last.
     n_labels = max(len(subtasks), 1 + max(int(video.labels.max()) for video in videos))
     learner = MSTCNLearner(config.network).fit(videos, n_labels)
@@ -227,7 +227,7 @@ def _never_shown(chosen: Sequence[Episode], others: Sequence[Episode]) -> tuple[
     return tuple(sorted(_shown(others) - _shown(chosen)))
 
 
-def _labelled_videos(
+def labelled_videos(
     pool: Pool,
     episodes: Sequence[Episode],
     subtasks: tuple[str, ...],

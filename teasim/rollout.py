@@ -13,7 +13,7 @@ from teasim.skills.library import perform
 from teasim.skills.pace import Pace, idle
 from teasim.task.mistakes import Plan
 from teasim.world.simulation import Simulation
-from teasim.world.station import sample_layout
+from teasim.world.station import draw_layout
 
 FINAL_REST = 0.5
 """The station is shown at least this long after the last sub-task [s]."""
@@ -37,11 +37,13 @@ def demonstrate(
     plan: Plan,
     rng: np.random.Generator,
     *,
+    randomize: bool = True,
     match_length: bool = False,
     participant: Participant = OPERATOR,
 ) -> Iterator[Step]:
     """Reset the station to a random layout and let `participant` carry out `plan` step by step.
 
+    Without `randomize` everything begins in its nominal place.
     With `match_length` it rests in between so that it lasts as long as any other demonstration.
     The simulation stands before each yielded step, so a caller can look at it, and is advanced
     when the next one is asked for. It goes to the float32 targets that a log holds, so `replay`
@@ -52,7 +54,7 @@ def demonstrate(
         SkillError: a sub-task cannot be done from the state the ones before it left.
     """
     _take_place(simulation, participant)
-    simulation.reset(sample_layout(rng))
+    simulation.reset(draw_layout(rng, randomize=randomize))
     style = sample_style(rng, participant)
     pace = Pace(plan.steps, participant.embodiment, rng) if match_length else None
     for position, subtask in enumerate(plan.steps):
@@ -101,7 +103,11 @@ def _advance(
 
 
 def replay(
-    simulation: Simulation, targets: Iterable[np.ndarray], rng: np.random.Generator
+    simulation: Simulation,
+    targets: Iterable[np.ndarray],
+    rng: np.random.Generator,
+    *,
+    randomize: bool = True,
 ) -> Iterator[np.ndarray]:
     """Carry a demonstration out again from its log.
 
@@ -112,8 +118,9 @@ def replay(
         simulation: the station; it is reset to the layout that `rng` draws.
         targets: the log, the column `action` of a pool: angles [rad] and openings [m] (16,) each.
         rng: a generator as `demonstrate` was given it; `teasim.generate.demo_rng` for a pool's.
+        randomize: as `demonstrate` was told.
     """
-    simulation.reset(sample_layout(rng))
+    simulation.reset(draw_layout(rng, randomize=randomize))
     for target in targets:
         yield target
         simulation.step(target)

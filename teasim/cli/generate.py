@@ -36,6 +36,9 @@ class GenerateArguments:
     skip, wrong_order, repeat, ineffective, wrong_object, abandoned."""
     optional: tuple[str, ...] = ()
     """Ingredients that half of the demonstrations do without, rightly: add_sugar, add_milk."""
+    randomize: bool = True
+    """Move and turn the things on the table in every demonstration; with --no-randomize each begins
+    with everything in its nominal place."""
     match_length: bool = False
     """Draw out all demonstrations so that their length says nothing about them."""
     embodiment: str = "yumi"

@@ -17,7 +17,7 @@ from teasim.task.scoring import Verdict, judge
 from teasim.world.looks import Look, check_look_kind, fixed_look, sample_look
 from teasim.world.simulation import Simulation
 from teasim.world.state import SimulationState
-from teasim.world.station import nominal_layout, sample_layout
+from teasim.world.station import draw_layout
 
 RENDER_SIZE = (480, 640)
 """Height and width of `render()` when the observations hold no pictures [pixels]."""
@@ -93,8 +93,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         """
         super().reset(seed=seed)
         randomize = (options or {}).get("randomize", self._randomize)
-        layout = sample_layout(self.np_random) if randomize else nominal_layout()
-        self._simulation.reset(layout)
+        self._simulation.reset(draw_layout(self.np_random, randomize=randomize))
         if self._look_kind == "random":  # else nothing is drawn: seeds keep their layouts
             self._wear(sample_look(self.np_random))
         return self._observation(), self._info(self._verdict())

@@ -38,6 +38,8 @@ class GenerateConfig:
     """Who demonstrates: yumi, with a joint log, or people, whose hands have none."""
     participants: int = 3
     """How many people take turns; the robot has one operator."""
+    randomize: bool = True
+    """Move and turn the things on the table in every demonstration."""
     match_length: bool = False
     """Draw out all demonstrations so that their length says nothing."""
     cameras: tuple[str, ...] = ("left", "cup")

@@ -76,7 +76,12 @@ def _record(
     simulation = Simulation(config.embodiment)
     participant = PARTICIPANTS[demo.participant]
     steps = demonstrate(
-        simulation, demo.plan, rng, match_length=config.match_length, participant=participant
+        simulation,
+        demo.plan,
+        rng,
+        randomize=config.randomize,
+        match_length=config.match_length,
+        participant=participant,
     )
     positions: list[int] = []
     with _camera(simulation, config, demo) as renderer:

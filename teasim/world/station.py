@@ -109,6 +109,11 @@ def sample_layout(rng: np.random.Generator) -> Layout:
             return Layout(placements)
 
 
+def draw_layout(rng: np.random.Generator, *, randomize: bool) -> Layout:
+    """A random layout, or the nominal one, for which nothing is drawn."""
+    return sample_layout(rng) if randomize else nominal_layout()
+
+
 def _moved(name: str, at: Placement, rng: np.random.Generator) -> Placement:
     reach, turn = (KNOB_RANGE, 0.0) if name == "knob" else (POSITION_RANGE, YAW_RANGE)
     dx, dy = rng.uniform(-reach, reach, size=2)

@@ -5,7 +5,7 @@ from itertools import groupby
 import numpy as np
 import pytest
 
-from teasim.rollout import demonstrate, run_subtask
+from teasim.rollout import demonstrate, replay, run_subtask
 from teasim.skills.arm import Style
 from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1, SEQ_2
@@ -42,6 +42,18 @@ def played(seed: int) -> np.ndarray:
 def test_a_seed_gives_one_demonstration():
     assert played(0).tobytes() == played(0).tobytes()
     assert played(0).tobytes() != played(1).tobytes()
+
+
+@pytest.mark.parametrize("carry_out", ["demonstrate", "replay"])
+def test_without_randomisation_everything_begins_in_its_place(carry_out):
+    simulation, nominal = Simulation(), Simulation()
+    nominal.reset(nominal_layout())
+    rng = np.random.default_rng(0)
+    if carry_out == "demonstrate":
+        next(demonstrate(simulation, Plan(("turn_on_oven",)), rng, randomize=False))
+    else:
+        next(replay(simulation, [nominal.target], rng, randomize=False))
+    assert simulation.environment_state().tobytes() == nominal.environment_state().tobytes()
 
 
 def test_the_simulation_stands_before_the_step_that_is_shown():

@@ -1,0 +1,192 @@
+"""Find the incorrect demonstrations of many pools drawn from a bank of rendered ones.
+
+The bank is the demonstrations of all POOLs together; each is segmented once, from its video alone.
+Labels of the demonstrations draw the pools and score what was found; the filter does not see them.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from filtering.segmentation.segmenter import segmenter_named
+from filtering.verdict import Verdict, by_norm
+from filtering.weights.steps import StepList, count_steps
+from policies.statistics import wilson_interval
+from teasim.pool import Pool
+from teasim.pool.leakage import auroc
+
+SIZES = (1, 2, 4, 6, 8)
+"""Numbers of demonstrations that are not Seq_1 beside ten that are (paper, tables 2 and 3)."""
+
+
+@dataclass(frozen=True)
+class Demo:
+    """A demonstration of the bank."""
+
+    steps: StepList
+    """What the segmenter saw."""
+    sequence: str
+    """Order of its sub-tasks, the truth."""
+    mistakes: frozenset[str]
+    """Kinds of its mistakes, the truth."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was found in one pool."""
+
+    verdict: Verdict
+    wrong: np.ndarray
+
+    @property
+    def found(self) -> int:
+        """Wrong ones that were flagged."""
+        return int((self.flagged & self.wrong).sum())
+
+    @property
+    def accused(self) -> int:
+        """Right ones that were flagged."""
+        return int((self.flagged & ~self.wrong).sum())
+
+    @property
+    def flagged(self) -> np.ndarray:
+        """(D,) what was flagged."""
+        return self.verdict.grouping.flagged
+
+
+def bank(pools: Iterable[Path], segmenter: str, jobs: int) -> tuple[list[Demo], int]:
+    """Segment all demonstrations; return them and the number of sub-tasks."""
+    demos: list[Demo] = []
+    names: tuple[str, ...] = ()
+    for path in pools:
+        pool = Pool.open(path)
+        found = segmenter_named(segmenter)(pool, jobs=jobs)
+        names = found.subtasks
+        for episode, spans, labels in zip(pool.episodes, found.spans, found.labels(), strict=True):
+            if episode.demo_id in found.labelled or episode.record is None:
+                continue
+            steps = StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
+            kinds = frozenset(mistake.name for mistake in episode.record.mistakes)
+            demos.append(Demo(steps, episode.record.sequence, kinds))
+    return demos, len(names)
+
+
+class Draws:
+    """Draws pools from the bank and judges them."""
+
+    def __init__(self, demos: Sequence[Demo], n_subtasks: int, pools: int) -> None:
+        """Keep the bank; `pools` are drawn for every row."""
+        self.demos, self.n_subtasks, self.pools = demos, n_subtasks, pools
+
+    def judge(self, kinds: Sequence[tuple[str, int]], groups: str, row: int) -> list[Outcome]:
+        """Draw `count` demonstrations of each sequence; those after the first kind are wrong."""
+        outcomes = []
+        for number in range(self.pools):
+            rng = np.random.default_rng([row, number])
+            drawn = [self._draw(kind, count, rng) for kind, count in kinds]
+            wrong = np.repeat(
+                [position > 0 for position in range(len(kinds))], list(map(len, drawn))
+            )
+            outcomes.append(self.outcome([demo for some in drawn for demo in some], wrong, groups))
+        return outcomes
+
+    def outcome(self, demos: Sequence[Demo], wrong: np.ndarray, groups: str) -> Outcome:
+        """Judge one pool."""
+        counts = count_steps([demo.steps for demo in demos], self.n_subtasks)
+        return Outcome(by_norm(counts, None, groups), wrong)  # type: ignore[arg-type]
+
+    def _draw(self, kind: str, count: int, rng: np.random.Generator) -> list[Demo]:
+        able = [demo for demo in self.demos if demo.sequence == kind and _plain(demo)]
+        if len(able) < count:
+            raise SystemExit(f"The bank has {len(able)} demonstrations of {kind}, not {count}.")
+        return [able[index] for index in rng.choice(len(able), count, replace=False)]
+
+
+def _plain(demo: Demo) -> bool:
+    return not demo.mistakes - {"skip"}
+
+
+def tables(draws: Draws) -> None:
+    """Print all rows."""
+    row = 0
+    for kind in ("seq_3", "seq_2"):
+        for k in SIZES:
+            row += 1
+            _print(f"10 seq_1 + {k} {kind}", draws.judge([("seq_1", 10), (kind, k)], "auto", row))
+    three = draws.judge([("seq_1", 6), ("seq_2", 4), ("seq_3", 2)], "3", 20)
+    truth = np.repeat([0, 1, 2], [6, 4, 2])
+    right = sum(bool((o.verdict.grouping.groups == truth).all()) for o in three)
+    print(f"6 + 4 + 2, told three groups: exactly right in {_share(right, len(three))}")
+    clean = draws.judge([("seq_1", 12)], "auto", 21)
+    silent = sum(not o.flagged.any() for o in clean)
+    print(f"12 seq_1: nothing flagged in {_share(silent, len(clean))}")
+    legal = draws.judge([("seq_1", 10), ("legal", 2)], "auto", 22)
+    print(
+        f"10 seq_1 + 2 legal: legal ones flagged {_share(sum(o.found for o in legal), 2 * len(legal))}"
+    )
+
+
+def kinds_table(draws: Draws) -> None:
+    """Print how well each kind of mistake is told from correct demonstrations."""
+    kinds = sorted({kind for demo in draws.demos for kind in demo.mistakes})
+    correct = [demo for demo in draws.demos if not demo.mistakes]
+    areas: dict[str, list[float]] = {kind: [] for kind in kinds}
+    lengths: list[float] = []
+    for number in range(draws.pools):
+        rng = np.random.default_rng([30, number])
+        pool = [correct[i] for i in rng.choice(len(correct), 10, replace=False)]
+        for kind in kinds:
+            able = [demo for demo in draws.demos if kind in demo.mistakes]
+            pool.append(able[rng.integers(len(able))])
+        wrong = np.arange(len(pool)) >= 10
+        losses = draws.outcome(pool, wrong, "auto").verdict.losses
+        for position, kind in enumerate(kinds, start=10):
+            chosen = [*range(10), position]
+            areas[kind].append(auroc(losses[chosen], wrong[chosen]))
+        lengths.append(auroc(np.array([-sum(d.steps.lengths) for d in pool], dtype=float), wrong))
+    for kind in kinds:
+        print(f"{kind:16} AUROC {np.mean(areas[kind]):.3f}")
+    print(f"{'macro':16} AUROC {np.mean([np.mean(a) for a in areas.values()]):.3f}")
+    print(f"{'length alone':16} AUROC {np.mean(lengths):.3f}")
+
+
+def _print(name: str, outcomes: Sequence[Outcome]) -> None:
+    wrong = sum(int(o.wrong.sum()) for o in outcomes)
+    found, accused = sum(o.found for o in outcomes), sum(o.accused for o in outcomes)
+    area = np.mean([auroc(o.verdict.losses, o.wrong) for o in outcomes])
+    accuracy = np.mean([(o.flagged == o.wrong).mean() for o in outcomes])
+    print(
+        f"{name:20} AUROC {area:.3f}  found {_share(found, wrong)}  "
+        f"accused per pool {accused / len(outcomes):.2f}  accuracy {100 * accuracy:.1f} %"
+    )
+
+
+def _share(hits: int, trials: int) -> str:
+    low, high = wilson_interval(hits, trials)
+    return f"{hits} of {trials} ({100 * low:.0f}-{100 * high:.0f} %)"
+
+
+TABLES: dict[str, Callable[[Draws], None]] = {"orders": tables, "kinds": kinds_table}
+
+
+def main() -> int:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("bank", nargs="+", type=Path, metavar="POOL")
+    parser.add_argument("--segmenter", required=True, help="truth, clustering or a folder")
+    parser.add_argument("--table", choices=TABLES, default="orders")
+    parser.add_argument("--pools", type=int, default=30, help="random pools per row")
+    parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
+    arguments = parser.parse_args()
+    demos, n_subtasks = bank(arguments.bank, arguments.segmenter, arguments.jobs)
+    print(f"bank: {len(demos)} demonstrations")
+    TABLES[arguments.table](Draws(demos, n_subtasks, arguments.pools))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+"""Fit MS-TCN++ to the labelled demonstrations of some pools and score it on others.
+
+POOL may be a folder, or FOLDER=PARTICIPANT,... for the demonstrations of some participants, or
+FOLDER:COUNT for the first few. Videos alone are looked at; labels of what is tested only score.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from filtering.frame_features import FrameSource
+from filtering.segmentation.metrics import SegmentationScores
+from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
+from filtering.segmentation.mstcn_training import MSTCNConfig, MSTCNLearner
+from filtering.segmentation.scoring import score_episodes
+from filtering.segmentation.segments import Segmentation
+from filtering.segmenting import labelled_videos
+from teasim.pool import Episode, Pool
+
+SHORTEST = 0.4
+"""Least length of a segment [s], the verb's default."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some demonstrations of a pool."""
+
+    name: str
+    pool: Pool
+    episodes: tuple[Episode, ...]
+
+
+def part(text: str) -> Part:
+    """Read POOL as the module's text describes it."""
+    path, _, participants = text.partition("=")
+    path, _, count = path.partition(":")
+    pool = Pool.open(path)
+    episodes = pool.episodes[: int(count)] if count else pool.episodes
+    if participants:
+        wanted = participants.split(",")
+        episodes = tuple(e for e in episodes if e.participant in wanted)
+    return Part(f"{Path(path).name}{text[len(path) :]}", pool, tuple(episodes))
+
+
+def fit(parts: Sequence[Part], arguments: argparse.Namespace, seed: int) -> MSTCNSegmenter:
+    """Fit one network to all demonstrations of `parts`."""
+    subtasks = parts[0].pool.subtasks
+    source = FrameSource(tuple(arguments.cameras), 5.0)
+    videos = [
+        video
+        for p in parts
+        for video in labelled_videos(p.pool, p.episodes, subtasks, source, arguments.jobs)
+    ]
+    n_labels = max(len(subtasks), 1 + max(int(video.labels.max()) for video in videos))
+    config = MSTCNConfig(seed=seed, scaling=arguments.scaling, epochs=arguments.epochs)
+    learner = MSTCNLearner(config).fit(videos, n_labels)
+    labelled = frozenset(e.demo_id for p in parts for e in p.episodes)
+    network = learner.network_
+    return MSTCNSegmenter(network, subtasks, source, arguments.scaling, SHORTEST, labelled)
+
+
+def by_order(p: Part, found: Segmentation) -> dict[str, SegmentationScores]:
+    """Return the scores of all demonstrations of a part, then by their order of sub-tasks."""
+    groups: dict[str, list[int]] = {"all": list(range(len(p.episodes)))}
+    for number, episode in enumerate(p.episodes):
+        groups.setdefault(episode.record.sequence if episode.record else "unknown", []).append(
+            number
+        )
+    return {
+        name: next(iter(score_episodes(*_chosen(p, found, numbers)).values()))
+        for name, numbers in groups.items()
+    }
+
+
+def _chosen(
+    p: Part, found: Segmentation, numbers: Sequence[int]
+) -> tuple[list[Episode], Segmentation]:
+    spans = tuple(found.spans[number] for number in numbers)
+    return [p.episodes[n] for n in numbers], Segmentation(found.subtasks, spans)
+
+
+def main() -> int:
+    """Print frame accuracy, edit and F1@50 of every test part, mean over seeds."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--train", nargs="+", type=part, required=True, metavar="POOL")
+    parser.add_argument("--test", nargs="+", type=part, required=True, metavar="POOL")
+    parser.add_argument("--seeds", type=int, default=3, help="networks; seeds 0, 1, ...")
+    parser.add_argument("--epochs", type=int, default=MSTCNConfig.epochs)
+    parser.add_argument("--scaling", default=MSTCNConfig.scaling, help="video or training")
+    parser.add_argument("--cameras", nargs="+", default=["left", "cup"])
+    parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
+    arguments = parser.parse_args()
+    found: dict[tuple[str, str], list[SegmentationScores]] = {}
+    for seed in range(arguments.seeds):
+        segmenter = fit(arguments.train, arguments, seed)
+        for p in arguments.test:
+            segments = segmenter.segment_episodes(p.pool, p.episodes, jobs=arguments.jobs)
+            for order, scores in by_order(p, segments).items():
+                found.setdefault((p.name, order), []).append(scores)
+    print(f"{'pool':24}{'order':10}{'videos':>7}  accuracy (lowest)   edit (lowest)  F1@50")
+    for (name, order), scores in found.items():
+        accuracy = np.array([s.accuracy for s in scores])
+        edit = np.array([s.edit for s in scores])
+        f1 = np.mean([s.f1[50] for s in scores])
+        print(
+            f"{name:24}{order:10}{scores[0].videos:7}  {accuracy.mean():8.1f} ({accuracy.min():.1f})"
+            f"  {edit.mean():8.1f} ({edit.min():.1f})  {f1:5.1f}"
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
