@@ -125,9 +125,8 @@ def tables(draws: Draws) -> None:
     silent = sum(not o.flagged.any() for o in clean)
     print(f"12 seq_1: nothing flagged in {_share(silent, len(clean))}")
     legal = draws.judge([("seq_1", 10), ("legal", 2)], "auto", 22)
-    print(
-        f"10 seq_1 + 2 legal: legal ones flagged {_share(sum(o.found for o in legal), 2 * len(legal))}"
-    )
+    accused = sum(o.found for o in legal)
+    print(f"10 seq_1 + 2 legal: legal ones flagged {_share(accused, 2 * len(legal))}")
 
 
 def kinds_table(draws: Draws) -> None:

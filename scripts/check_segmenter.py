@@ -107,7 +107,8 @@ def main() -> int:
         edit = np.array([s.edit for s in scores])
         f1 = np.mean([s.f1[50] for s in scores])
         print(
-            f"{name:24}{order:10}{scores[0].videos:7}  {accuracy.mean():8.1f} ({accuracy.min():.1f})"
+            f"{name:24}{order:10}{scores[0].videos:7}"
+            f"  {accuracy.mean():8.1f} ({accuracy.min():.1f})"
             f"  {edit.mean():8.1f} ({edit.min():.1f})  {f1:5.1f}"
         )
     return 0
