@@ -61,7 +61,7 @@ class FitArguments:
     """Times every video is shown."""
     camera: tuple[str, ...] = field(default=())
     """Cameras whose pictures are used; all if none is named."""
-    rate: float = 5.0
+    rate: float = 2.5
     """Moments looked at per second of video."""
     scaling: str = "video"
     """Scale features within each video (video), or by the training set alone (training)."""

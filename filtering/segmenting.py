@@ -50,7 +50,7 @@ class FitConfig:
     """How many to draw of those that have labels; None: USUAL_LABELLED, or all of fewer."""
     cameras: tuple[str, ...] = ()
     """Cameras whose pictures are used; empty means all."""
-    rate: float = 5.0
+    rate: float = 2.5
     """Moments looked at per second of video [Hz]."""
     shortest: float = 0.4
     """Least length of a segment that the segmenter returns [s]."""

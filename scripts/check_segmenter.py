@@ -49,7 +49,7 @@ def part(text: str) -> Part:
 def fit(parts: Sequence[Part], arguments: argparse.Namespace, seed: int) -> MSTCNSegmenter:
     """Fit one network to all demonstrations of `parts`."""
     subtasks = parts[0].pool.subtasks
-    source = FrameSource(tuple(arguments.cameras), 5.0)
+    source = FrameSource(tuple(arguments.cameras), arguments.rate)
     videos = [
         video
         for p in parts
@@ -91,7 +91,8 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=3, help="networks; seeds 0, 1, ...")
     parser.add_argument("--epochs", type=int, default=MSTCNConfig.epochs)
     parser.add_argument("--scaling", default=MSTCNConfig.scaling, help="video or training")
-    parser.add_argument("--cameras", nargs="+", default=["left", "cup"])
+    parser.add_argument("--cameras", nargs="+", default=["left"])
+    parser.add_argument("--rate", type=float, default=FrameSource.rate, help="moments/s looked at")
     parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
     arguments = parser.parse_args()
     found: dict[tuple[str, str], list[SegmentationScores]] = {}
