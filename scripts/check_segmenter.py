@@ -1,7 +1,7 @@
 """Fit MS-TCN++ to the labelled demonstrations of some pools and score it on others.
 
-POOL may be a folder, or FOLDER=PARTICIPANT,... for the demonstrations of some participants, or
-FOLDER:COUNT for the first few. Videos alone are looked at; labels of what is tested only score.
+POOL is FOLDER[=PARTICIPANT,...][:COUNT]: all demonstrations of a pool, those of some participants,
+the first few of them. Videos alone are looked at; labels of what is tested only score.
 """
 
 import argparse
@@ -36,14 +36,13 @@ class Part:
 
 def part(text: str) -> Part:
     """Read POOL as the module's text describes it."""
-    path, _, participants = text.partition("=")
-    path, _, count = path.partition(":")
+    chosen, _, count = text.partition(":")
+    path, _, participants = chosen.partition("=")
     pool = Pool.open(path)
-    episodes = pool.episodes[: int(count)] if count else pool.episodes
-    if participants:
-        wanted = participants.split(",")
-        episodes = tuple(e for e in episodes if e.participant in wanted)
-    return Part(f"{Path(path).name}{text[len(path) :]}", pool, tuple(episodes))
+    wanted = participants.split(",") if participants else None
+    episodes = [e for e in pool.episodes if wanted is None or e.participant in wanted]
+    kept = episodes[: int(count)] if count else episodes
+    return Part(f"{Path(path).name}{text[len(path) :]}", pool, tuple(kept))
 
 
 def fit(parts: Sequence[Part], arguments: argparse.Namespace, seed: int) -> MSTCNSegmenter:
