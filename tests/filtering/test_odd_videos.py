@@ -1,0 +1,80 @@
+"""Videos nobody would choose: very short, black, of an uneven rate, tiny or of an odd size."""
+
+import shutil
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from filtering.demo_filter import DemoFilter, FilterConfig
+from filtering.segmentation.mstcn_training import MSTCNConfig
+from filtering.segmenting import FitConfig, fit_segmenter
+from teasim.pool import Pool
+from tests import toy_pool
+from tests.toy_pool import SEQ_1, make_toy_pool
+
+ONE_OF_FIVE = [SEQ_1, SEQ_1, SEQ_1, SEQ_1, SEQ_1[:5] + SEQ_1[6:]]
+QUICK = MSTCNConfig(epochs=2, channels=8, prediction_layers=3, refinement_layers=2)
+
+
+def flagged(pool: Pool, **settings) -> list[bool]:
+    found = DemoFilter(FilterConfig(**settings)).fit(pool)
+    assert np.isfinite(found.losses_).all()
+    assert np.isfinite(found.weights_).all()
+    return found.flagged_.tolist()
+
+
+@pytest.mark.parametrize(("frames", "size"), [(1, 32), (2, 66), (9, 34)])
+def test_segments_of_few_frames_and_small_pictures(tmp_path, frames, size):
+    pool = make_toy_pool(tmp_path / "pool", ONE_OF_FIVE, size=size, frames_per_subtask=frames)
+    assert flagged(pool) == [False] * 4 + [True]
+
+
+def test_a_video_of_one_frame_among_longer_ones(tmp_path):
+    pool = make_toy_pool(tmp_path / "pool", [*ONE_OF_FIVE[:4], ("stir",)], frames_per_subtask=1)
+    assert pool.episodes[-1].length == 1
+    assert flagged(pool) == [False] * 4 + [True]
+
+
+def test_black_videos_are_judged_by_their_steps(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        toy_pool, "_picture", lambda _rng, header, *_: np.zeros((header.height,) * 2 + (3,), "u1")
+    )
+    pool = make_toy_pool(tmp_path / "pool", ONE_OF_FIVE, frames_per_subtask=3)
+    assert flagged(pool) == [False] * 4 + [True]
+
+
+def test_black_videos_fit_a_segmenter_that_sees_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        toy_pool, "_picture", lambda _rng, header, *_: np.zeros((header.height,) * 2 + (3,), "u1")
+    )
+    pool = make_toy_pool(tmp_path / "pool", ONE_OF_FIVE, frames_per_subtask=3)
+    result = fit_segmenter(pool.root, tmp_path / "s", FitConfig(labelled=3, network=QUICK))
+    assert np.isfinite(result.loss)
+    assert flagged(pool, segmenter=str(tmp_path / "s")) == [False] * 5  # all look alike
+
+
+def test_frames_are_counted_not_timed(tmp_path):
+    pool = make_toy_pool(tmp_path / "pool", ONE_OF_FIVE, frames_per_subtask=3)
+    expected = DemoFilter().fit(pool).table()
+    shutil.copytree(pool.root, tmp_path / "uneven")
+    for video in (tmp_path / "uneven").rglob("*.mp4"):
+        slow_down(video)
+    uneven = DemoFilter().fit(Pool.open(tmp_path / "uneven")).table()
+    assert [(row.weight, row.flagged) for row in uneven] == [
+        (row.weight, row.flagged) for row in expected
+    ]
+
+
+def slow_down(video: Path) -> None:
+    """Write a video anew with the same frames, ever slower."""
+    slow = video.with_suffix(".slow.mp4")
+    with av.open(str(video)) as source, av.open(str(slow), "w") as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for number, packet in enumerate(p for p in source.demux(video=0) if p.size):
+            step = packet.duration or 1
+            packet.pts = packet.dts = step * number * (number + 1) // 2
+            packet.stream = stream
+            target.mux(packet)
+    slow.replace(video)
