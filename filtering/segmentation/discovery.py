@@ -31,8 +31,10 @@ MOST_SUBTASKS = 12
 """Most that are looked for when nobody says how many there are."""
 MOST_STAGES = 10
 """Most stages of a sub-task; videos of few moments have fewer, so that MOST_SUBTASKS fit in."""
-SMALLEST_GAIN = 0.03
+SMALLEST_GAIN = 0.035
 """Share of the unexplained variance that a further sub-task has to explain."""
+PATIENCE = 3
+"""So many numbers of sub-tasks in a row without gain end the search."""
 STARTS = 4
 """Starts that are followed to the end, the best of all at first sight."""
 SPARE_PARTS = (0, 2)
@@ -84,8 +86,7 @@ def discover(videos: Sequence[Array], subtasks: int | None = None) -> Discovery:
     stages = stage_count([len(video) for video in videos], subtasks)
     kept = [_stretched(len(video), stages) for video in videos]
     stacked = Videos.of([video[rows] for video, rows in zip(videos, kept, strict=True)])
-    numbers = [subtasks] if subtasks else range(1, most_subtasks(stacked.lengths, stages) + 1)
-    fit = min((_best_fit(stacked, T, stages) for T in numbers), key=_Fit.cost)
+    fit = _best_fit(stacked, subtasks, stages) if subtasks else _best_number(stacked, stages)
     order = _usual_order(fit.states // stages, stacked.lengths)
     rank = np.full(len(fit.model.means), len(order))
     rank[order] = np.arange(len(order))
@@ -117,6 +118,17 @@ def most_subtasks(lengths: NDArray[np.int64], stages: int) -> int:
 def _stretched(length: int, least: int) -> NDArray[np.int64]:
     """Return the moments of a video, some of them more than once where it has too few."""
     return np.arange(length) if length >= least else np.arange(least) * length // least
+
+
+def _best_number(videos: Videos, stages: int) -> _Fit:
+    """Return the fit whose number of sub-tasks costs least, of 1, 2, ..."""
+    best = _best_fit(videos, 1, stages)
+    for subtasks in range(2, most_subtasks(videos.lengths, stages) + 1):
+        fit = _best_fit(videos, subtasks, stages)
+        best = min(best, fit, key=_Fit.cost)
+        if subtasks - len(best.model.means) >= PATIENCE:
+            break
+    return best
 
 
 def _best_fit(videos: Videos, subtasks: int, stages: int) -> _Fit:
