@@ -90,7 +90,7 @@ def test_permuting_the_videos_permutes_the_result(four):
 
 
 def test_more_noise_makes_less_sure(four):
-    noisy = discover(made_up(ORDERS, noise=2.0)[0], 4)
+    noisy = discover(made_up(ORDERS, noise=8.0)[0], 4)
     sure, unsure = (
         np.concatenate([video.max(axis=1) for video in one.posteriors]).mean()
         for one in (four[2], noisy)
