@@ -20,8 +20,10 @@ class FilterArguments:
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
     segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool), or the folder of a segmenter
-    that `teasim segment fit` made."""
+    """Where segments come from: truth (the labels logged in the pool), clustering (the videos
+    alone, without labels), or the folder of a segmenter that `teasim segment fit` made."""
+    subtasks: str = "auto"
+    """Number of sub-tasks that clustering looks for; auto finds it out."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
@@ -139,6 +141,7 @@ def run(arguments: FilterArguments) -> int:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
     config = FilterConfig(
         segmenter=arguments.segmenter,
+        subtasks=arguments.subtasks,
         score=arguments.score,
         solver=arguments.solver,
         groups=arguments.groups,
@@ -151,6 +154,10 @@ def run(arguments: FilterArguments) -> int:
     jobs = arguments.jobs or parallel.default_jobs()
     fitted = DemoFilter(config).fit(pool, jobs=jobs)
     write_filter_output(arguments.out, pool, fitted, overwrite=arguments.overwrite)
+    confidence = fitted.segments_.confidence()
+    if confidence is not None:
+        found = len(fitted.segments_.subtasks)
+        print(f"{found} sub-tasks, recognised with a mean probability of {confidence:.2f}.")
     for row in fitted.table():
         if row.flagged:
             print(f"video {row.episode_index}  weight {row.weight:.2f}  {row.reason}")

@@ -14,7 +14,7 @@ from filtering.background import subtraction_named
 from filtering.explain import Finding, explain, find_strange_steps
 from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
-from filtering.frames import chosen_cameras
+from filtering.frames import chosen_cameras, main_camera
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.sequence import transitions
@@ -30,8 +30,6 @@ from teasim.pool.weight_table import WeightRow
 
 FEWEST_DEMOS = 3
 """With fewer demonstrations there is no majority to agree with."""
-MAIN_CAMERA = "left"
-"""Camera that is used when none is named and the pool has it; else the pool's first one."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,10 @@ class FilterConfig:
     """How a pool is filtered."""
 
     segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool), or the folder of a fitted
-    segmenter (the logged labels are then not read)."""
+    """Where segments come from: truth (the labels logged in the pool), clustering (the videos
+    alone), or the folder of a fitted segmenter; the last two read no logged label."""
+    subtasks: str = "auto"
+    """Number of sub-tasks that clustering looks for; auto finds it out."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
@@ -65,7 +65,7 @@ class FilterConfig:
         Raises:
             ConfigError: in one sentence, with the choices.
         """
-        segmenter_named(self.segmenter)
+        segmenter_named(self.segmenter, self.subtasks)
         judge_named(self.score)
         solver_named(self.solver)
         subtraction_named(self.background)
@@ -133,9 +133,10 @@ class DemoFilter:
         config = self.config
         self.timings_ = {}
         self._check(pool)
-        self.cameras_ = chosen_cameras(pool, config.cameras) or (_main_camera(pool),)
+        self.cameras_ = chosen_cameras(pool, config.cameras) or (main_camera(pool),)
         with self._timed("segments"):
-            self.segments_ = segmenter_named(config.segmenter)(pool, jobs=jobs)
+            segmenter = segmenter_named(config.segmenter, config.subtasks, self.cameras_)
+            self.segments_ = segmenter(pool, jobs=jobs)
         with self._timed("features"):
             features = segment_features(
                 pool,
@@ -219,7 +220,3 @@ class DemoFilter:
         start = time.perf_counter()
         yield
         self.timings_[stage] = time.perf_counter() - start
-
-
-def _main_camera(pool: Pool) -> str:
-    return MAIN_CAMERA if MAIN_CAMERA in pool.cameras else pool.cameras[0]

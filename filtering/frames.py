@@ -10,6 +10,9 @@ LARGEST_SIDE = 224
 """Frames whose shorter side is longer are area-averaged down to it [pixels]; the backbone was
 trained at this size. Smaller frames stay as they are: enlarging costs time and adds nothing."""
 
+MAIN_CAMERA = "left"
+"""The camera that sees both arms and every object."""
+
 Frames = NDArray[np.uint8]
 """(n, H, W, 3) RGB."""
 
@@ -41,6 +44,11 @@ def fit_size(frames: Frames) -> Frames:
 
     size = (round(width * scale), round(height * scale))
     return np.stack([cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in frames])
+
+
+def main_camera(pool: Pool) -> str:
+    """Return the camera that is used when none is named: MAIN_CAMERA, or else the first one."""
+    return MAIN_CAMERA if MAIN_CAMERA in pool.cameras else pool.cameras[0]
 
 
 def chosen_cameras(pool: Pool, wanted: tuple[str, ...]) -> tuple[str, ...]:

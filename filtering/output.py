@@ -107,6 +107,7 @@ def run_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any]:
         "cameras": list(fitted.cameras_),
         "subtasks": list(fitted.segments_.subtasks),
         "segmentation": _segmentation_record(fitted, pool),
+        "segmentation_confidence": fitted.segments_.confidence(),
         "demonstrations": len(fitted.weights_),
         "flagged": int(fitted.flagged_.sum()),
         "groups": int(fitted.groups_.max()) + 1,

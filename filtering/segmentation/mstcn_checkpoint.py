@@ -13,7 +13,7 @@ from filtering.frame_features import FrameSource
 from filtering.pretrained import RECIPE, weights_digest
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
-from filtering.segmentation.mstcn_training import SCALINGS
+from filtering.segmentation.scaling import SCALINGS
 from teasim.errors import CheckpointError, ConfigError
 from teasim.pool.checkpoint import CheckpointKind
 

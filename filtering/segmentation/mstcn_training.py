@@ -18,13 +18,10 @@ from tqdm import tqdm
 
 from filtering.determinism import one_thread, seeded
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape, mstcn_loss
+from filtering.segmentation.scaling import SCALINGS, mean_and_scale, scaled
 from teasim.errors import ConfigError
 from teasim.pool.types import runs
 
-SCALINGS = ("video", "training")
-"""What features are centred and scaled by before the training set's own moments."""
-SCALE_FLOOR = 0.05
-"""Least scale of a feature [mean scale of all]; what hardly varies must not become noise."""
 FEWEST_FRAMES = 2
 """The smoothing loss compares frames."""
 
@@ -193,14 +190,6 @@ def frame_posteriors(
     return posteriors
 
 
-def scaled(features: NDArray[np.float32], scaling: str) -> NDArray[np.float32]:
-    """Return features (n, D) of a video with mean 0 and scale 1, or as they are for `training`."""
-    if scaling == "training":
-        return features
-    mean, scale = _moments(features)
-    return (features - mean) / scale
-
-
 def rearrange(
     labels: NDArray[np.int64], rng: np.random.Generator, left_out: float
 ) -> NDArray[np.int64]:
@@ -223,18 +212,9 @@ def rearrange(
 
 def _standardise(network: MSTCN, features: Sequence[NDArray[np.float32]]) -> None:
     """Set the network's normaliser to the moments of the training set, per video (n, D)."""
-    mean, scale = _moments(np.concatenate(features))
+    mean, scale = mean_and_scale(np.concatenate(features))
     network.feature_mean.copy_(torch.from_numpy(mean)[:, None])
     network.feature_scale.copy_(torch.from_numpy(scale)[:, None])
-
-
-def _moments(features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return mean and scale, (D,) each, of rows (n, D)."""
-    mean = features.mean(axis=0, dtype=np.float64)
-    deviation = features.std(axis=0, dtype=np.float64)
-    floor = SCALE_FLOOR * deviation.mean()
-    scale = np.maximum(deviation, floor if floor > 0.0 else 1.0)
-    return mean.astype(np.float32), scale.astype(np.float32)
 
 
 def _tensor(features: NDArray[np.float32]) -> Tensor:

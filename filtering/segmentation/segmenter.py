@@ -1,7 +1,9 @@
 """Segments of every demonstration of a pool, by name of the segmenter."""
 
+from functools import partial
 from pathlib import Path
 
+from filtering.segmentation.clustering import AUTO, clustering, subtask_count
 from filtering.segmentation.segments import Segmentation, Segmenter
 from teasim.errors import ConfigError, PoolError
 from teasim.pool import Episode, Pool, Span
@@ -42,16 +44,28 @@ def _logged_spans(episode: Episode) -> tuple[Span, ...]:
     return spans
 
 
-SEGMENTERS: dict[str, Segmenter] = {"truth": truth}
+SEGMENTERS: dict[str, Segmenter] = {"truth": truth, "clustering": clustering}
 
 
-def segmenter_named(name: str) -> Segmenter:
+def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = ()) -> Segmenter:
     """Return a segmenter by its name, or the one that was saved in the folder of that name.
 
+    Args:
+        name: of SEGMENTERS, or a folder.
+        subtasks: how many sub-tasks `clustering` looks for, AUTO to find that out.
+        cameras: whose pictures it compares; empty means the main one.
+
     Raises:
-        ConfigError: there is none of that name.
+        ConfigError: there is none of that name, or it does not count sub-tasks.
         CheckpointError: the folder holds no segmenter, or a damaged one.
     """
+    count = subtask_count(subtasks)
+    if name == "clustering":
+        return partial(clustering, subtasks=count, cameras=cameras)
+    if count is not None:
+        raise ConfigError(
+            f"The segmenter '{name}' knows its sub-tasks; a number of them is for 'clustering'."
+        )
     if name in SEGMENTERS:
         return SEGMENTERS[name]
     if not Path(name).is_dir():

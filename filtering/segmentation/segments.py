@@ -34,6 +34,15 @@ class Segmentation:
         numbers = {name: number for number, name in enumerate(self.subtasks)}
         return [[numbers[span.subtask] for span in spans] for spans in self.spans]
 
+    def confidence(self) -> float | None:
+        """Return the mean probability of the most probable label of a frame, over all frames.
+
+        None where segments were given, not inferred.
+        """
+        if self.posteriors is None:
+            return None
+        return float(np.concatenate([video.max(axis=1) for video in self.posteriors]).mean())
+
 
 class Segmenter(Protocol):
     """Finds the segments of every demonstration of a pool."""

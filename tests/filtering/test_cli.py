@@ -40,9 +40,13 @@ def test_too_many_flagged_is_exit_code_1(
     [
         (["--max-flagged", "2"], "--max-flagged is 2.0; choose a share from 0 to 1."),
         (
-            ["--segmenter", "clustering"],
-            "Unknown segmenter 'clustering'; choose truth or the folder of one that "
+            ["--segmenter", "luck"],
+            "Unknown segmenter 'luck'; choose truth, clustering or the folder of one that "
             "`teasim segment fit` made.",
+        ),
+        (
+            ["--segmenter", "clustering", "--subtasks", "few"],
+            "subtasks is 'few'; choose auto or a number from 1.",
         ),
         (["--camera", "roof"], "The pool has no camera 'roof'; choose from left, cup."),
         (["--jobs", "-1"], "jobs is -1; choose 1 or more."),

@@ -66,8 +66,8 @@ def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
     ("change", "message"),
     [
         (
-            {"segmenter": "clustering"},
-            "Unknown segmenter 'clustering'; choose truth or the folder of one that "
+            {"segmenter": "luck"},
+            "Unknown segmenter 'luck'; choose truth, clustering or the folder of one that "
             "`teasim segment fit` made.",
         ),
         ({"score": "luck"}, "Unknown score 'luck'; choose norm, equation3."),

@@ -20,8 +20,8 @@ from filtering.segmentation.mstcn_training import (
     MSTCNLearner,
     frame_posteriors,
     rearrange,
-    scaled,
 )
+from filtering.segmentation.scaling import scaled
 from teasim.errors import ConfigError
 from teasim.pool.types import runs
 

@@ -1,0 +1,95 @@
+"""Segments of a pool nobody labelled: the videos are compared with each other.
+
+Only how the pictures of one camera look is used (the average of the finer feature map), scaled
+within each video, so that camera and light do not matter. What `discovery` finds in them gets the
+names step 1, step 2, ... in the usual order of first occurrence.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from filtering.frame_features import FrameSource, frame_features, moment_of_frames
+from filtering.frames import chosen_cameras, main_camera
+from filtering.segmentation.discovery import discover
+from filtering.segmentation.scaling import scaled
+from filtering.segmentation.segments import Segmentation, spans_of
+from teasim.errors import ConfigError
+from teasim.pool import Episode, Pool
+
+AUTO = "auto"
+"""Number of sub-tasks that means: find it out."""
+AVERAGES = 112
+"""Features of a camera that are used, the first of its block: averages of the stride-16 map."""
+
+
+def clustering(
+    pool: Pool, *, jobs: int = 1, subtasks: int | None = None, cameras: tuple[str, ...] = ()
+) -> Segmentation:
+    """Find sub-tasks that the demonstrations of a pool have in common; labels are not read.
+
+    Args:
+        pool: two demonstrations or more.
+        jobs: worker processes that look at videos; the result does not depend on it.
+        subtasks: how many to look for; None to find that out.
+        cameras: whose pictures are compared; empty means the main one.
+
+    Raises:
+        ConfigError: the videos are too few or too short, or there is no such camera.
+        PoolError: a video is missing or damaged.
+    """
+    if len(pool.episodes) < 2:
+        raise ConfigError(
+            f"The pool '{pool.root}' has {len(pool.episodes)} demonstrations; the segmenter "
+            "'clustering' compares two or more."
+        )
+    source = FrameSource(chosen_cameras(pool, cameras) or (main_camera(pool),))
+    # The order of the demonstrations in the pool must not matter, not even to rounding.
+    order = sorted(range(len(pool.episodes)), key=lambda number: pool.episodes[number].demo_id)
+    episodes = [pool.episodes[number] for number in order]
+    videos = looks(episodes, pool.fps, source, jobs=jobs)
+    longest = max(map(len, videos))
+    if subtasks is not None and subtasks > longest:
+        raise ConfigError(
+            f"{subtasks} sub-tasks were asked for but the longest video of the pool "
+            f"'{pool.root}' is looked at only {longest} times; choose fewer."
+        )
+    with threadpool_limits(limits=1, user_api="blas"):  # sums get one order
+        found = discover(videos, subtasks)
+    names = tuple(f"step {number + 1}" for number in range(found.posteriors[0].shape[1]))
+    spans, posteriors = {}, {}
+    for place, number in enumerate(order):
+        nearest = moment_of_frames(episodes[place].length, len(videos[place]))
+        posteriors[number] = found.posteriors[place][nearest].astype(np.float32)
+        spans[number] = spans_of(found.labels[place][nearest], posteriors[number], names)
+    numbers = range(len(order))
+    return Segmentation(
+        names, tuple(spans[n] for n in numbers), tuple(posteriors[n] for n in numbers)
+    )
+
+
+def looks(
+    episodes: Sequence[Episode], fps: float, source: FrameSource, *, jobs: int
+) -> list[NDArray[np.float64]]:
+    """Return per demonstration (n, F) what is compared, each feature scaled within its video."""
+    width = len(source.cameras)
+    videos = []
+    for moments in frame_features(episodes, fps, source, jobs=jobs):
+        blocks = [camera[:, :AVERAGES] for camera in np.split(moments, width, axis=1)]
+        videos.append(scaled(np.hstack(blocks), "video").astype(np.float64))
+    return videos
+
+
+def subtask_count(text: str) -> int | None:
+    """Return the number of sub-tasks that an option names, None for AUTO.
+
+    Raises:
+        ConfigError: it is neither.
+    """
+    if text == AUTO:
+        return None
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise ConfigError(f"subtasks is '{text}'; choose {AUTO} or a number from 1.")
+    return int(text)
