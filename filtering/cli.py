@@ -188,6 +188,9 @@ def _fit(arguments: FitArguments) -> int:
         )
     print(f"fitted to {len(result.labelled)} demonstrations: {_listed(result.labelled)}")
     print(scores_table(result.scores))
+    if result.effects:
+        read = (f"{name} {100 * share:.0f} %" for name, share in result.effects.items())
+        print(f"effects read in videos not learned from, balanced accuracy: {', '.join(read)}")
     print(f"segmenter: {arguments.out}")
     return 0
 
