@@ -53,7 +53,8 @@ def effect_surprises(changes: Sequence[Array], labels: Sequence[Sequence[int]]) 
     nats = np.zeros(len(amounts))
     for row in np.flatnonzero(np.isfinite(amounts)):
         others = amounts[(subtasks == subtasks[row]) & (demos != demos[row])]
-        nats[row] = (1 - 2 * amounts[row]) / (2 * _spread(others) ** 2)
+        # The opposite of the usual effect is no more than none of it.
+        nats[row] = (1 - 2 * max(amounts[row], 0.0)) / (2 * _spread(others) ** 2)
     return np.split(np.maximum(nats, 0.0), np.cumsum(lengths)[:-1])
 
 
