@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from filtering.effects.checkpoint import save_effects
 from filtering.effects.reader import FEWEST_DEMOS, EffectReader, fit_effects
 from filtering.effects.rests import rest_features
+from filtering.features.checkpoint import save_features
+from filtering.features.learned import LookConfig, learn_features
 from filtering.frame_features import (
     FrameSource,
     frame_features,
@@ -58,6 +60,8 @@ class FitConfig:
     """Moments looked at per second of video [Hz]."""
     shortest: float = 0.4
     """Least length of a segment that the segmenter returns [s]."""
+    features: bool = False
+    """Whether the paper's features are learned too, from the first of the cameras."""
     network: MSTCNConfig = field(default_factory=MSTCNConfig)
     """The network's settings; its seed also draws the demonstrations."""
 
@@ -108,6 +112,8 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         labelled=frozenset(episode.demo_id for episode in chosen),
     )
     effects = _learn_effects(pool, chosen, features, frames)
+    look = LookConfig(frames.cameras[0])
+    learned = learn_features(chosen, subtasks, look, jobs=jobs) if config.features else None
     tried = [*chosen, *_draw(others, CHECKED, config.network.seed)]
     scores = score_episodes(tried, segmenter.segment_episodes(pool, tried, jobs=jobs))
     result = FitResult(
@@ -118,6 +124,8 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         effects={} if effects is None else effects.reliability(),
     )
     record = _record(pool, config, result, learner.history_, time.perf_counter() - began)
+    if learned is not None:
+        save_features(learned, out)
     if effects is not None:
         save_effects(effects, out)
     save_segmenter(segmenter, out, record)
