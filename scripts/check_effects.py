@@ -19,7 +19,7 @@ from teasim.parallel import default_jobs
 from teasim.pool import Pool
 from teasim.pool.leakage import auroc
 
-BY_CHANCE = "stir"
+INVISIBLE = "stir"
 """Sub-task whose effect nothing shows at rest; it is printed, but not counted."""
 NOTICED = 2.0
 """Surprise from which a demonstration counts as noticed [nats]."""
@@ -54,9 +54,9 @@ def read(train: Pool, test: Pool, source: FrameSource, jobs: int) -> float:
     for effect, share, expected in zip(reader.effects, found, reader.accuracies, strict=True):
         until = f" until {effect.undone_by}" if effect.undone_by else ""
         print(f"  {effect.subtask + until:30}{100 * share:6.1f}  ({100 * expected:.1f})")
-    counted = [effect.subtask != BY_CHANCE for effect in reader.effects]
+    counted = [effect.subtask != INVISIBLE for effect in reader.effects]
     mean = float(found[counted].mean())
-    print(f"  mean without {BY_CHANCE:17}{100 * mean:6.1f}")
+    print(f"  mean without {INVISIBLE:17}{100 * mean:6.1f}")
     return mean
 
 

@@ -153,7 +153,7 @@ def test_a_picture_shows_where_a_channel_looks():
     heat = bottleneck.channel_maps(maps, 1)
     assert heat.shape == (4, 4, 4)
     seen = bottleneck.transform([maps])[0][:, 1]
-    bias = float(bottleneck.network_.reduce.bias[1])
+    bias = float(bottleneck.network_.reduce.bias[1].detach())
     np.testing.assert_allclose(heat.max(axis=(1, 2)) + bias, seen, rtol=1e-5)
     shown = overlay(bottleneck, frames, maps, 1).astype(int)
     frame = frames[int(heat.max(axis=(1, 2)).argmax())].astype(int)
