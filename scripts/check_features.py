@@ -83,7 +83,7 @@ def ablation(
     kinds = {
         "raw": [_strongest([m.max(axis=(2, 3)) for m in clips.maps]) for clips in (train, test)],
         "bottleneck": [_strongest(seen) for seen in reduced],
-        "ranked": [generator.transform(seen) for seen in reduced],
+        "ranked": [generator.transform(seen)[:, generator.kept_] for seen in reduced],
     }
     for kind, (known, new) in kinds.items():
         shares = []
