@@ -37,6 +37,9 @@ class FilterArguments:
     """Most frames looked at in a segment."""
     background: str = "median"
     """Background subtraction: none, median or mog2."""
+    features: str = "pooled"
+    """What describes a segment: pooled (nothing is learned), or the folder of a segmenter that
+    `teasim segment fit --features` made."""
     max_flagged: float = 1.0
     """Exit with 1 when more than this share of the demonstrations is flagged, 0 to 1."""
     jobs: int = 0
@@ -69,6 +72,8 @@ class FitArguments:
     """Scale features within each video (video), or by the training set alone (training)."""
     rearranged: float = 0.5
     """Chance that a video is shown with its segments in a random order, 0 to 1."""
+    features: bool = False
+    """Also learn what tells the segments of sub-tasks apart, for `teasim filter --features`."""
     seed: int = 0
     """Seed of the network, and of the draw."""
     jobs: int = 0
@@ -148,6 +153,7 @@ def run(arguments: FilterArguments) -> int:
         cameras=arguments.camera,
         frames_per_segment=arguments.frames_per_segment,
         background=arguments.background,
+        features=arguments.features,
     )
     pool = Pool.open(arguments.source)
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)
@@ -178,6 +184,7 @@ def _fit(arguments: FitArguments) -> int:
         labelled=arguments.labelled,
         cameras=arguments.camera,
         rate=arguments.rate,
+        features=arguments.features,
         network=MSTCNConfig(
             epochs=arguments.epochs,
             scaling=arguments.scaling,
@@ -195,6 +202,9 @@ def _fit(arguments: FitArguments) -> int:
         )
     print(f"fitted to {len(result.labelled)} demonstrations: {_listed(result.labelled)}")
     print(scores_table(result.scores))
+    if result.effects:
+        read = (f"{name} {100 * share:.0f} %" for name, share in result.effects.items())
+        print(f"effects read in videos not learned from, balanced accuracy: {', '.join(read)}")
     print(f"segmenter: {arguments.out}")
     return 0
 

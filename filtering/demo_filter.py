@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.background import subtraction_named
 from filtering.explain import Finding, explain, find_strange_steps
-from filtering.features.extraction import segment_features
+from filtering.features.description import POOLED, check_description, describe_segments
 from filtering.features.reduction import reduce_features
 from filtering.frames import chosen_cameras, main_camera
 from filtering.segmentation.segmenter import segmenter_named
@@ -54,6 +54,9 @@ class FilterConfig:
     """Most frames looked at in a segment (paper section 3.2)."""
     background: str = "median"
     """Background subtraction: none, median or mog2."""
+    features: str = POOLED
+    """What describes a segment: pooled (nothing is learned), or the folder of a segmenter that was
+    fitted with features (they keep to the camera, frames and background they were learned from)."""
     trusted_share: float = 0.5
     """M / D, share of demonstrations that equation 3 trusts."""
     ridge: float = 0.01
@@ -69,6 +72,7 @@ class FilterConfig:
         judge_named(self.score)
         solver_named(self.solver)
         subtraction_named(self.background)
+        check_description(self.features)
         if self.groups not in GROUPS:
             raise ConfigError(
                 f"Unknown number of groups '{self.groups}'; choose {', '.join(GROUPS)}."
@@ -138,7 +142,8 @@ class DemoFilter:
             segmenter = segmenter_named(config.segmenter, config.subtasks, self.cameras_)
             self.segments_ = segmenter(pool, jobs=jobs)
         with self._timed("features"):
-            features = segment_features(
+            features = describe_segments(
+                config.features,
                 pool,
                 self.segments_.spans,
                 cameras=self.cameras_,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from filtering.cache import ArrayCache, default_folder
 from filtering.frames import fit_size, uniform_indices
-from filtering.pretrained import RECIPE, weights_digest
+from filtering.pretrained import feature_recipe
 from teasim import parallel
 from teasim.errors import ConfigError
 from teasim.pool import Episode, VideoClip, read_frames
@@ -137,19 +137,22 @@ def side_by_side(videos: Sequence[NDArray[np.float32]], width: int) -> list[NDAr
 
 def describe_moments(task: FrameTask) -> NDArray[np.float32]:
     """Return the features (n, F) of the moments of `task`, and cache them."""
+    features = describe_clip(task.clip, sampled_frames(task.clip.length, task.count))
+    ArrayCache(task.cache_folder).put(_key(task), features)
+    return features
+
+
+def describe_clip(clip: VideoClip, wanted: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return the features (n, F) of the frames `wanted` of a clip, in order of time."""
     from filtering.backbone import describe_frames
 
-    clip = task.clip
-    wanted = sampled_frames(clip.length, task.count)
     parts = []
     for first in range(0, len(wanted), CHUNK):
         indices = wanted[first : first + CHUNK]
         offset = int(indices[0])
         rest = VideoClip(clip.path, clip.start_frame + offset, clip.length - offset)
         parts.append(describe_frames(fit_size(read_frames(rest, indices - offset))))
-    features = np.concatenate(parts)
-    ArrayCache(task.cache_folder).put(_key(task), features)
-    return features
+    return np.concatenate(parts)
 
 
 def clip_key(clip: VideoClip, recipe: Sequence[Any]) -> str:
@@ -157,7 +160,7 @@ def clip_key(clip: VideoClip, recipe: Sequence[Any]) -> str:
     content = hashlib.sha256()
     for digest in video_content(clip.path).digests[clip.start_frame :][: clip.length]:
         content.update(digest)
-    content.update(json.dumps([RECIPE, weights_digest(), *recipe]).encode())
+    content.update(json.dumps([*feature_recipe(), *recipe]).encode())
     return content.hexdigest()
 
 

@@ -30,3 +30,8 @@ def weights_path() -> Path:
 def weights_digest() -> str:
     """Return the SHA-256 of the weight file; part of every cache key."""
     return hashlib.sha256(weights_path().read_bytes()).hexdigest()
+
+
+def feature_recipe() -> list[str]:
+    """Return what a frame's features are computed by; changes whenever they do."""
+    return [RECIPE, weights_digest()]

@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from filtering.effects.checkpoint import save_effects
+from filtering.effects.reader import FEWEST_DEMOS, EffectReader, fit_effects
+from filtering.effects.rests import rest_features
+from filtering.features.checkpoint import save_features
+from filtering.features.learned import LookConfig, learn_features
 from filtering.frame_features import (
     FrameSource,
     frame_features,
@@ -54,6 +60,8 @@ class FitConfig:
     """Moments looked at per second of video [Hz]."""
     shortest: float = 0.4
     """Least length of a segment that the segmenter returns [s]."""
+    features: bool = False
+    """Whether the paper's features are learned too, from the first of the cameras."""
     network: MSTCNConfig = field(default_factory=MSTCNConfig)
     """The network's settings; its seed also draws the demonstrations."""
 
@@ -70,6 +78,9 @@ class FitResult:
     """Mean loss of the last epoch [nats, summed over stages]."""
     scores: Scores
     """How good it is, by part of the pool."""
+    effects: dict[str, float]
+    """Balanced accuracy of each effect that is read at rest, by its sub-task [share]; empty where
+    too few demonstrations are labelled."""
 
 
 def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) -> FitResult:
@@ -87,7 +98,8 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
     began = time.perf_counter()
-    videos = labelled_videos(pool, chosen, subtasks, frames, jobs)
+    features = frame_features(chosen, pool.fps, frames, jobs=jobs)
+    videos = labelled_videos(chosen, features, subtasks)
     # Frames of no sub-task, where there are any, are one more label, the last.
     n_labels = max(len(subtasks), 1 + max(int(video.labels.max()) for video in videos))
     learner = MSTCNLearner(config.network).fit(videos, n_labels)
@@ -99,6 +111,9 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         shortest=config.shortest,
         labelled=frozenset(episode.demo_id for episode in chosen),
     )
+    effects = _learn_effects(pool, chosen, features, frames)
+    look = LookConfig(frames.cameras[0])
+    learned = learn_features(chosen, subtasks, look, jobs=jobs) if config.features else None
     tried = [*chosen, *_draw(others, CHECKED, config.network.seed)]
     scores = score_episodes(tried, segmenter.segment_episodes(pool, tried, jobs=jobs))
     result = FitResult(
@@ -106,8 +121,13 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         never_shown=_never_shown(chosen, others),
         loss=learner.history_[-1],
         scores=scores,
+        effects={} if effects is None else effects.reliability(),
     )
     record = _record(pool, config, result, learner.history_, time.perf_counter() - began)
+    if learned is not None:
+        save_features(learned, out)
+    if effects is not None:
+        save_effects(effects, out)
     save_segmenter(segmenter, out, record)
     return result
 
@@ -228,21 +248,35 @@ def _never_shown(chosen: Sequence[Episode], others: Sequence[Episode]) -> tuple[
 
 
 def labelled_videos(
-    pool: Pool,
     episodes: Sequence[Episode],
+    features: Sequence[NDArray[np.float32]],
     subtasks: tuple[str, ...],
-    source: FrameSource,
-    jobs: int,
 ) -> list[LabelledVideo]:
     """Return features and labels at each moment; frames of no sub-task get the label T."""
     columns = [index_from_spans(e.spans(), subtasks, e.length) for e in episodes]
-    features = frame_features(episodes, pool.fps, source, jobs=jobs)
     videos = []
     for episode, column, moments in zip(episodes, columns, features, strict=True):
         labels = column[sampled_frames(episode.length, len(moments))]
         labels = np.where(labels == NO_SUBTASK, len(subtasks), labels)
         videos.append(LabelledVideo(f"of demonstration {episode.index}", moments, labels))
     return videos
+
+
+def _learn_effects(
+    pool: Pool,
+    episodes: Sequence[Episode],
+    features: Sequence[NDArray[np.float32]],
+    frames: FrameSource,
+) -> EffectReader | None:
+    """Return what reads the effects of labelled demonstrations; None where they are too few."""
+    if len(episodes) < FEWEST_DEMOS:
+        return None
+    rests = [
+        rest_features(moments, episode.length, episode.spans(), pool.fps)
+        for moments, episode in zip(features, episodes, strict=True)
+    ]
+    done = [[span.subtask for span in episode.spans()] for episode in episodes]
+    return fit_effects(rests, done, frames)
 
 
 def _record(
@@ -255,6 +289,7 @@ def _record(
         "labelled": list(result.labelled),
         "never_shown": list(result.never_shown),
         "metrics": scores_json(result.scores),
+        "effects": result.effects,
         "history": list(history),
         "versions": {name: version(name) for name in ("teasim", "torch", "numpy")},
         "seconds": round(seconds, 3),

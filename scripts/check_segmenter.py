@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.frame_features import FrameSource
+from filtering.frame_features import FrameSource, frame_features
 from filtering.segmentation.metrics import SegmentationScores
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.mstcn_training import MSTCNConfig, MSTCNLearner
@@ -49,11 +49,10 @@ def fit(parts: Sequence[Part], arguments: argparse.Namespace, seed: int) -> MSTC
     """Fit one network to all demonstrations of `parts`."""
     subtasks = parts[0].pool.subtasks
     source = FrameSource(tuple(arguments.cameras), arguments.rate)
-    videos = [
-        video
-        for p in parts
-        for video in labelled_videos(p.pool, p.episodes, subtasks, source, arguments.jobs)
-    ]
+    videos = []
+    for p in parts:
+        features = frame_features(p.episodes, p.pool.fps, source, jobs=arguments.jobs)
+        videos += labelled_videos(p.episodes, features, subtasks)
     n_labels = max(len(subtasks), 1 + max(int(video.labels.max()) for video in videos))
     config = MSTCNConfig(seed=seed, scaling=arguments.scaling, epochs=arguments.epochs)
     learner = MSTCNLearner(config).fit(videos, n_labels)

@@ -50,9 +50,13 @@ class BottleneckNetwork(nn.Module):
 
     def activations(self, maps: Tensor) -> Tensor:
         """(n, C, h, w) -> (n, N): each channel's maximum over the picture."""
+        return self.excitation(maps).amax(dim=2) + self.reduce.bias
+
+    def excitation(self, maps: Tensor) -> Tensor:
+        """(n, C, h, w) -> (n, N, h * w): each channel over the picture, without its bias."""
         pixels = (maps.flatten(2) - self.map_mean) / self.map_scale
-        seen: Tensor = self.reduce.weight @ pixels  # (n, N, h * w)
-        return seen.amax(dim=2) + self.reduce.bias
+        seen: Tensor = self.reduce.weight @ pixels
+        return seen
 
     def forward(self, maps: Tensor, lengths: Sequence[int]) -> Tensor:
         """Frames of b clips, one after the other, with their numbers of frames -> (b, T)."""
@@ -103,6 +107,17 @@ class Bottleneck:
         _check(clips, len(self.network_.map_mean))
         with one_thread(), torch.inference_mode():
             return [self.network_.activations(_tensor(clip)).numpy() for clip in clips]
+
+    def channel_maps(self, clip: FeatureMaps, channel: int) -> NDArray[np.float32]:
+        """Return (n, h, w): where in the frames of a clip (n, C, h, w) a channel is excited.
+
+        Raises:
+            ConfigError: the clip has another number of channels than in `fit`, or is not finite.
+        """
+        _check([clip], len(self.network_.map_mean))
+        with one_thread(), torch.inference_mode():
+            seen = self.network_.excitation(_tensor(clip))[:, channel]
+        return seen.numpy().reshape(len(clip), *clip.shape[2:])
 
     def predict(self, clips: Sequence[FeatureMaps]) -> NDArray[np.int64]:
         """Return the likeliest sub-task of each clip, (S,).

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from filtering.background import subtraction_named
 from filtering.cache import ArrayCache, default_folder
 from filtering.frame_features import clip_key, look_up_or_describe, side_by_side
-from filtering.frames import fit_size, segment_indices, uniform_indices
+from filtering.frames import Frames, fit_size, segment_indices, uniform_indices
 from teasim.pool import Pool, Span, VideoClip, read_frames
 
 OVERVIEW = 31
@@ -70,16 +70,24 @@ def describe_video(task: VideoTask) -> NDArray[np.float32]:
     """Return the features (n, FRAME_FEATURES) of the n frames of `task`, and cache them."""
     from filtering.backbone import describe_frames
 
-    indices = _frames_of(task)
-    overview = uniform_indices(0, task.clip.length, OVERVIEW)
-    wanted = np.unique(np.concatenate([indices, overview]))
-    frames = fit_size(read_frames(task.clip, wanted))
-    foreground = subtraction_named(task.background)(
-        frames[np.searchsorted(wanted, indices)], frames[np.searchsorted(wanted, overview)]
-    )
-    features = describe_frames(foreground)
+    features = describe_frames(foreground(task.clip, _frames_of(task), task.background))
     ArrayCache(task.cache_folder).put(_key(task), features)
     return features
+
+
+def foreground(clip: VideoClip, indices: NDArray[np.int64], background: str) -> Frames:
+    """Return frames of a clip (n, H, W, 3), `indices` in order of time, without the background.
+
+    Raises:
+        ConfigError: there is no such background subtraction.
+        PoolError: the video is missing or damaged.
+    """
+    overview = uniform_indices(0, clip.length, OVERVIEW)
+    wanted = np.unique(np.concatenate([indices, overview]))
+    frames = fit_size(read_frames(clip, wanted))
+    return subtraction_named(background)(
+        frames[np.searchsorted(wanted, indices)], frames[np.searchsorted(wanted, overview)]
+    )
 
 
 def pool_over_time(task: VideoTask, frames: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -10,7 +10,7 @@ from safetensors.torch import load as load_tensors
 
 from filtering.determinism import seeded
 from filtering.frame_features import FrameSource
-from filtering.pretrained import RECIPE, weights_digest
+from filtering.pretrained import feature_recipe
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.scaling import SCALINGS
@@ -30,7 +30,7 @@ def save_segmenter(segmenter: MSTCNSegmenter, folder: Path, record: Mapping[str,
         "subtasks": segmenter.subtasks,
         "network": asdict(segmenter.network.shape),
         "source": asdict(segmenter.source),
-        "features": _feature_recipe(),
+        "features": feature_recipe(),
         "scaling": segmenter.scaling,
         "shortest": segmenter.shortest,
         "labelled": sorted(segmenter.labelled),
@@ -47,7 +47,7 @@ def load_segmenter(folder: Path) -> MSTCNSegmenter:
             or a damaged one.
     """
     description = SEGMENTER.describe(folder)
-    if description.get("features") != _feature_recipe():
+    if description.get("features") != feature_recipe():
         raise CheckpointError(
             f"'{SEGMENTER.description_path(folder)}' was fitted to other features of a frame than "
             "this program computes; fit again."
@@ -77,8 +77,3 @@ def _segmenter(description: Mapping[str, Any], weights: bytes) -> MSTCNSegmenter
         shortest=float(description["shortest"]),
         labelled=frozenset(map(str, description["labelled"])),
     )
-
-
-def _feature_recipe() -> list[str]:
-    """Return what a frame's features are computed by; changes whenever they do."""
-    return [RECIPE, weights_digest()]

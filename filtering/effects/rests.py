@@ -1,0 +1,129 @@
+"""The video at rest: what it shows before the first segment and after each one.
+
+Between two segments the hands are away and what was done is in view: a knob that glows, a bag in
+the cup, milk. What is subtracted from it cancels what a video has of its own, its light and its
+camera.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filtering.cache import ArrayCache, default_folder
+from filtering.frame_features import (
+    FrameSource,
+    clip_key,
+    describe_clip,
+    look_up_or_describe,
+    sample_count,
+    sampled_frames,
+    side_by_side,
+)
+from teasim.pool import Episode, Span, VideoClip
+
+REST = 0.3
+"""Moments up to this far from the border of two segments are averaged [s]. Not many: they help
+against noise only while the hands are away."""
+
+
+@dataclass(frozen=True)
+class RestTask:
+    """One video to look at when it is at rest; small, so that it travels to a worker process."""
+
+    clip: VideoClip
+    """Where the frames are."""
+    frames: tuple[int, ...]
+    """The frames that are looked at, in order."""
+    cache_folder: Path
+    """Folder of the feature cache."""
+
+
+def rest_features(
+    moments: NDArray[np.floating], length: int, spans: Sequence[Span], fps: float
+) -> NDArray[np.float64]:
+    """Return (q + 1, F): what is seen at rest before the first of q segments and after each.
+
+    Args:
+        moments: (n, F) features of a video, see `frame_features`.
+        length: frames of the video.
+        spans: its q segments in order of time [frames]; between them nothing is done.
+        fps: frames per second of the video.
+    """
+    return _means(moments, rest_moments(sampled_frames(length, len(moments)), spans, fps))
+
+
+def look_at_rests(
+    episodes: Sequence[Episode],
+    segments: Sequence[tuple[Span, ...]],
+    fps: float,
+    source: FrameSource,
+    *,
+    jobs: int,
+) -> list[NDArray[np.float64]]:
+    """Return per demonstration `rest_features` (q + 1, F), looking at no other moments.
+
+    Args:
+        episodes: the demonstrations.
+        segments: the segments of each.
+        fps: frames per second of their videos.
+        source: cameras and rate.
+        jobs: worker processes; the result does not depend on it.
+
+    Raises:
+        PoolError: a video is missing or damaged, or there is no such camera.
+    """
+    tasks, places = [], []
+    for episode, spans in zip(episodes, segments, strict=True):
+        count = sample_count(episode.length, fps, source.rate)
+        frames = sampled_frames(episode.length, count)
+        chosen = rest_moments(frames, spans, fps)
+        used = np.unique(np.concatenate(chosen))
+        places.append([np.searchsorted(used, numbers) for numbers in chosen])
+        for camera in source.cameras:
+            seen = tuple(frames[used].tolist())
+            tasks.append(RestTask(episode.video(camera), seen, default_folder()))
+    described = look_up_or_describe(tasks, _key, describe_rests, jobs)
+    videos = side_by_side(described, len(source.cameras))
+    return [_means(moments, chosen) for moments, chosen in zip(videos, places, strict=True)]
+
+
+def changes(rests: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (q, F): what each of q segments changed, from `rest_features` (q + 1, F)."""
+    return np.diff(rests, axis=0)
+
+
+def rest_moments(
+    frames: NDArray[np.int64], spans: Sequence[Span], fps: float
+) -> list[NDArray[np.int64]]:
+    """Return which moments show the video at rest, before the first of q segments and after each.
+
+    Args:
+        frames: (n,) the frame of each moment.
+        spans: q segments in order of time [frames].
+        fps: frames per second.
+    """
+    between = [(one.stop + other.start) / 2 for one, other in pairwise(spans)]
+    borders = [float(spans[0].start), *between, float(spans[-1].stop)]
+    distances = [np.abs(frames + 0.5 - border) for border in borders]
+    return [np.flatnonzero(far <= max(REST * fps, far.min())) for far in distances]
+
+
+def describe_rests(task: RestTask) -> NDArray[np.float32]:
+    """Return the features (n, F) of the frames of `task`, and cache them."""
+    features = describe_clip(task.clip, np.array(task.frames))
+    ArrayCache(task.cache_folder).put(_key(task), features)
+    return features
+
+
+def _means(
+    moments: NDArray[np.floating], chosen: Sequence[NDArray[np.int64]]
+) -> NDArray[np.float64]:
+    return np.stack([moments[numbers].mean(axis=0, dtype=np.float64) for numbers in chosen])
+
+
+def _key(task: RestTask) -> str:
+    return clip_key(task.clip, ["rests", task.clip.length, list(task.frames)])

@@ -1,0 +1,117 @@
+"""The paper's features from end to end: frames, bottleneck, intervals, ranked channels, one vector.
+
+Learned from the labelled demonstrations of a segmenter and kept beside it; a segment then becomes
+1 x 32 by the maximum over time of the channels that matter (paper section 3.2).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filtering.features.bottleneck import Bottleneck
+from filtering.features.config import BottleneckConfig, GeneratorConfig
+from filtering.features.generator import FeatureGenerator
+from filtering.features.maps import segment_maps
+from teasim import parallel
+from teasim.errors import ConfigError
+from teasim.pool import Episode, Pool, Span, VideoClip
+
+
+@dataclass(frozen=True)
+class LookConfig:
+    """What the learned features look at."""
+
+    camera: str
+    """Camera whose pictures are used."""
+    frames_per_segment: int = 64
+    """Most frames looked at in a segment."""
+    background: str = "median"
+    """Background subtraction: none, median or mog2."""
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedFeatures:
+    """Describes a segment by the channels that tell sub-tasks apart."""
+
+    look: LookConfig
+    """What is looked at."""
+    bottleneck: Bottleneck
+    """Feature maps to activations of N channels."""
+    generator: FeatureGenerator
+    """Activations over time to one vector."""
+
+    def describe(
+        self, pool: Pool, segments: Sequence[tuple[Span, ...]], *, jobs: int
+    ) -> list[NDArray[np.float64]]:
+        """Return per demonstration (q, N): what each of its segments looks like.
+
+        Args:
+            pool: where the videos are.
+            segments: the segments of each demonstration.
+            jobs: worker processes; the result does not depend on it.
+
+        Raises:
+            ConfigError: the pool lacks the camera that the features were learned from.
+            PoolError: a video is missing or damaged.
+        """
+        if self.look.camera not in pool.cameras:
+            raise ConfigError(
+                f"The features were learned from the camera '{self.look.camera}', which the pool "
+                f"'{pool.root}' lacks; it has {', '.join(pool.cameras) or 'none'}."
+            )
+        tasks = [
+            _Task(episode.video(self.look.camera), spans, self)
+            for episode, spans in zip(pool.episodes, segments, strict=True)
+        ]
+        return parallel.run(_describe, tasks, jobs=jobs, description="looking at segments")
+
+
+def learn_features(
+    episodes: Sequence[Episode],
+    subtasks: Sequence[str],
+    look: LookConfig,
+    bottleneck: BottleneckConfig | None = None,
+    generator: GeneratorConfig | None = None,
+    *,
+    jobs: int = 1,
+) -> LearnedFeatures:
+    """Learn from the labelled segments of `episodes`, without settings with the default ones.
+
+    Raises:
+        ConfigError: fewer than two sub-tasks are shown, or a setting is out of range.
+        PoolError: a video is missing or damaged.
+    """
+    tasks = [_MapsTask(episode.video(look.camera), episode.spans(), look) for episode in episodes]
+    found = parallel.run(_maps, tasks, jobs=jobs, description="looking at labelled segments")
+    clips = [maps for video in found for maps in video]
+    labels = [subtasks.index(span.subtask) for task in tasks for span in task.spans]
+    reduced = Bottleneck(bottleneck).fit(clips, labels)
+    ranked = FeatureGenerator(generator).fit(reduced.transform(clips), labels)
+    return LearnedFeatures(look, reduced, ranked)
+
+
+@dataclass(frozen=True)
+class _MapsTask:
+    clip: VideoClip
+    spans: tuple[Span, ...]
+    look: LookConfig
+
+
+@dataclass(frozen=True)
+class _Task:
+    clip: VideoClip
+    spans: tuple[Span, ...]
+    learned: LearnedFeatures
+
+
+def _maps(task: _MapsTask) -> list[NDArray[np.float16]]:
+    look = task.look
+    return segment_maps(task.clip, task.spans, look.frames_per_segment, look.background)
+
+
+def _describe(task: _Task) -> NDArray[np.float64]:
+    learned = task.learned
+    maps = _maps(_MapsTask(task.clip, task.spans, learned.look))
+    return learned.generator.transform(learned.bottleneck.transform(maps))
