@@ -16,12 +16,13 @@ class FilterArguments:
     """Give every demonstration of a pool a weight and flag the incorrect ones."""
 
     source: Annotated[Path, tyro.conf.Positional]
-    """The pool: a LeRobot v3.0 data set with labelled sub-tasks."""
+    """The pool: a LeRobot v3.0 data set with labelled sub-tasks, or an MS-TCN folder (labels per
+    frame in groundTruth/*.txt or predictions/*.txt, mapping.txt) without videos."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
     segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool), or the folder of a segmenter
-    that `teasim segment fit` made."""
+    """Where segments come from: truth (the labels logged in the pool), predictions (those stored in
+    an MS-TCN folder), or the folder of a segmenter that `teasim segment fit` made."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
@@ -35,6 +36,8 @@ class FilterArguments:
     """Most frames looked at in a segment."""
     background: str = "median"
     """Background subtraction: none, median or mog2."""
+    fps: float | None = None
+    """Frames (lines) per second of an MS-TCN folder; times are told in frames if not given."""
     max_flagged: float = 1.0
     """Exit with 1 when more than this share of the demonstrations is flagged, 0 to 1."""
     jobs: int = 0
@@ -132,8 +135,8 @@ def run(arguments: FilterArguments) -> int:
     """
     from filtering.demo_filter import DemoFilter, FilterConfig
     from filtering.output import check_output, write_filter_output
+    from filtering.segmentation.sequence_pool import SequencePool, open_source
     from teasim import parallel
-    from teasim.pool import Pool
 
     if not 0.0 <= arguments.max_flagged <= 1.0:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
@@ -146,14 +149,15 @@ def run(arguments: FilterArguments) -> int:
         frames_per_segment=arguments.frames_per_segment,
         background=arguments.background,
     )
-    pool = Pool.open(arguments.source)
+    pool = open_source(arguments.source, arguments.fps)
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)
     jobs = arguments.jobs or parallel.default_jobs()
     fitted = DemoFilter(config).fit(pool, jobs=jobs)
     write_filter_output(arguments.out, pool, fitted, overwrite=arguments.overwrite)
     for row in fitted.table():
         if row.flagged:
-            print(f"video {row.episode_index}  weight {row.weight:.2f}  {row.reason}")
+            name = row.demo_id if isinstance(pool, SequencePool) else f"video {row.episode_index}"
+            print(f"{name}  weight {row.weight:.2f}  {row.reason}")
     share = float(fitted.flagged_.mean())
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
     print(f"report: {arguments.out / 'report.html'}")

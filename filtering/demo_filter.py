@@ -11,19 +11,16 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.background import subtraction_named
-from filtering.explain import Finding, explain, find_strange_steps
+from filtering.explain import Finding, explain
 from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
 from filtering.frames import chosen_cameras
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
-from filtering.sequence import transitions
+from filtering.segmentation.sequence_pool import SequencePool, Source
 from filtering.thresholds import GROUPS
-from filtering.verdict import Verdict, judge_named
-from filtering.weights.problem import Problem
-from filtering.weights.score import score
-from filtering.weights.solvers import Solution, solver_named
-from filtering.weights.steps import StepCounts, StepList, count_steps
+from filtering.verdict import Evidence, Rule, Verdict, judge_named
+from filtering.weights.solvers import solver_named
 from teasim.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow
@@ -32,6 +29,8 @@ FEWEST_DEMOS = 3
 """With fewer demonstrations there is no majority to agree with."""
 MAIN_CAMERA = "left"
 """Camera that is used when none is named and the pool has it; else the pool's first one."""
+ABOUT_PICTURES = ("cameras", "frames_per_segment", "background")
+"""Settings that mean nothing for step lists."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,8 @@ class FilterConfig:
     """How a pool is filtered."""
 
     segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool), or the folder of a fitted
-    segmenter (the logged labels are then not read)."""
+    """Where segments come from: truth (the labels logged in the pool), predictions (those stored in
+    an MS-TCN folder), or the folder of a fitted segmenter (the logged labels are then not read)."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
@@ -92,10 +91,10 @@ class DemoFilter:
         flagged_ (D,): True where it is called incorrect.
         groups_ (D,): group, 0 is the best.
         reasons_: a sentence for each flagged demonstration, else "".
-        findings_: strange steps of each demonstration, the worst first.
+        findings_: strange steps of each demonstration, the one that is named first.
         threshold_: weight below which a demonstration is flagged, 0 when nothing is.
-        trust_ (D,): w of equation 3, in [0, 1], sum M.
-        objective_: value of equation 3 [nats per step]; trusted_: M.
+        trust_ (D,): how much it shapes what is usual, in [0, 1]; w of equation 3 sums to M.
+        objective_: value of equation 3 [nats per step]; None for another score.
         segments_: the segments used.
         cameras_: the cameras used.
         timings_: seconds per stage.
@@ -109,8 +108,7 @@ class DemoFilter:
     findings_: tuple[tuple[Finding, ...], ...]
     threshold_: float
     trust_: NDArray[np.float64]
-    objective_: float
-    trusted_: float
+    objective_: float | None
     segments_: Segmentation
     cameras_: tuple[str, ...]
     timings_: dict[str, float]
@@ -119,7 +117,7 @@ class DemoFilter:
         """Prepare a filter; without `config` with the default settings."""
         self.config = FilterConfig() if config is None else config
 
-    def fit(self, pool: Pool, *, jobs: int = 1) -> Self:
+    def fit(self, pool: Source, *, jobs: int = 1) -> Self:
         """Weigh the demonstrations of `pool`, which is not modified.
 
         Args:
@@ -127,44 +125,26 @@ class DemoFilter:
             jobs: worker processes that look at videos; the result does not depend on it.
 
         Raises:
-            ConfigError: the pool has too few demonstrations, or no camera of that name.
+            ConfigError: the pool has too few demonstrations, no camera of that name, or no pictures
+                where a setting is about them.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
-        config = self.config
         self.timings_ = {}
         self._check(pool)
-        self.cameras_ = chosen_cameras(pool, config.cameras) or (_main_camera(pool),)
+        self.cameras_ = self._cameras(pool)
         with self._timed("segments"):
-            self.segments_ = segmenter_named(config.segmenter)(pool, jobs=jobs)
+            self.segments_ = self._segments(pool, jobs)
         with self._timed("features"):
-            features = segment_features(
-                pool,
-                self.segments_.spans,
-                cameras=self.cameras_,
-                frames_per_segment=config.frames_per_segment,
-                background=config.background,
-                jobs=jobs,
-            )
+            states = self._states(pool, jobs)
         # The matrices are small: more BLAS threads only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
-            rows = transitions(
-                reduce_features(features), self.segments_.labels(), len(self.segments_.subtasks)
-            )
-            problem = Problem(rows, config.ridge)
-            self.trusted_ = config.trusted_share * len(pool.episodes)
-            solution = solver_named(config.solver)(problem, self.trusted_)
-            surprises = score(problem, solution)
-            judge = judge_named(config.score)
-            self._learn(solution, judge(self._counts(), surprises, config.groups))
-        findings = find_strange_steps(
-            rows, surprises, self.segments_.spans, self.segments_.subtasks
-        )
-        self.findings_ = tuple(findings)
+            evidence = Evidence(self.segments_.subtasks, self.segments_.spans, states)
+            self._learn(judge_named(self.config.score)(evidence, self._rule()))
         self.reasons_ = tuple(
             explain(found, pool.fps) if flagged else ""
-            for found, flagged in zip(findings, self.flagged_, strict=True)
+            for found, flagged in zip(self.findings_, self.flagged_, strict=True)
         )
-        self._identify(pool)
+        self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
         return self
 
     def table(self) -> tuple[WeightRow, ...]:
@@ -182,7 +162,7 @@ class DemoFilter:
             for row, (demo_id, index) in enumerate(self._identities)
         )
 
-    def _check(self, pool: Pool) -> None:
+    def _check(self, pool: Source) -> None:
         count = len(pool.episodes)
         if count < FEWEST_DEMOS:
             raise ConfigError(
@@ -195,24 +175,50 @@ class DemoFilter:
                 "demonstrations."
             )
 
-    def _counts(self) -> StepCounts:
-        demos = [
-            StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
-            for labels, spans in zip(self.segments_.labels(), self.segments_.spans, strict=True)
-        ]
-        return count_steps(demos, len(self.segments_.subtasks))
+    def _cameras(self, pool: Source) -> tuple[str, ...]:
+        """Return the cameras to look at, none where there are no pictures."""
+        if isinstance(pool, Pool):
+            return chosen_cameras(pool, self.config.cameras) or (_main_camera(pool),)
+        for setting in ABOUT_PICTURES:
+            if getattr(self.config, setting) != getattr(FilterConfig, setting):
+                raise ConfigError(
+                    f"'{pool.root}' has no pictures, which {setting} is about; leave it out."
+                )
+        return ()
 
-    def _learn(self, solution: Solution, verdict: Verdict) -> None:
+    def _segments(self, pool: Source, jobs: int) -> Segmentation:
+        if isinstance(pool, SequencePool):
+            return pool.segments(self.config.segmenter)
+        return segmenter_named(self.config.segmenter)(pool, jobs=jobs)
+
+    def _states(self, pool: Source, jobs: int) -> list[NDArray[np.float64]]:
+        """Return per demonstration (q, N): what its segments look like, else which they are."""
+        if isinstance(pool, SequencePool):
+            eye = np.eye(len(self.segments_.subtasks))
+            return [eye[labels] for labels in self.segments_.labels()]
+        features = segment_features(
+            pool,
+            self.segments_.spans,
+            cameras=self.cameras_,
+            frames_per_segment=self.config.frames_per_segment,
+            background=self.config.background,
+            jobs=jobs,
+        )
+        return reduce_features(features)
+
+    def _rule(self) -> Rule:
+        config = self.config
+        return Rule(config.groups, config.solver, config.trusted_share, config.ridge)
+
+    def _learn(self, verdict: Verdict) -> None:
         self.weights_ = verdict.weights
         self.losses_ = verdict.losses
-        self.trust_ = solution.weights
-        self.objective_ = solution.objective
+        self.trust_ = verdict.trust
+        self.objective_ = verdict.objective
         self.groups_ = verdict.grouping.groups
         self.flagged_ = verdict.grouping.flagged
         self.threshold_ = verdict.grouping.threshold
-
-    def _identify(self, pool: Pool) -> None:
-        self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
+        self.findings_ = verdict.findings
 
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:
