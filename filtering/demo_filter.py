@@ -44,7 +44,8 @@ class FilterConfig:
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
     solver: str = "annealed"
-    """Solver of equation 3: annealed."""
+    """Solver of equation 3: annealed, alternating, exact (24 different demonstrations at most) or
+    published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
     """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
     cameras: tuple[str, ...] = ()

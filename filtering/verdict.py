@@ -112,15 +112,15 @@ def by_equation_3(evidence: Evidence, rule: Rule) -> Verdict:
     """Judge by the surprises of equation 3."""
     rows = transitions(evidence.states, evidence.labels, len(evidence.subtasks))
     problem = Problem(rows, rule.ridge)
-    solution = solver_named(rule.solver)(problem, rule.trusted_share * rows.n_demos)
-    found = score(problem, solution)
+    solved = solver_named(rule.solver).fit(problem, rule.trusted_share * rows.n_demos)
+    found = score(problem, solved)
     return Verdict(
         losses=found.losses,
         weights=found.weights,
         grouping=group_weights(found.weights, rule.groups),
-        trust=solution.weights,
+        trust=solved.weights_,
         findings=find_surprises(rows, found, evidence.labels, evidence.places),
-        objective=solution.objective,
+        objective=solved.objective_,
     )
 
 

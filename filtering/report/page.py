@@ -107,8 +107,6 @@ def render_report(
     Raises:
         TeasimError: the file cannot be written.
     """
-    names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
-    colours = {name: _colour(number) for number, name in enumerate(names)}
     ordered = sorted(demos, key=lambda demo: (demo.weight, demo.episode_index))
     longest = max((demo.seconds for demo in demos), default=1.0) or 1.0
     page = (
@@ -119,7 +117,7 @@ def render_report(
             summary=summary or _count_flagged(demos),
             demos=ordered,
             threshold=threshold,
-            colours=colours,
+            colours=_colours(demos, subtasks),
             longest=longest,
             dots=_dots(ordered),
             sections=sections,
@@ -146,6 +144,11 @@ def _environment() -> Environment:
     environment.filters["data_url"] = _data_url
     environment.filters["trusted"] = lambda html: Markup(html)
     return environment
+
+
+def _colours(demos: Sequence[DemoView], subtasks: Sequence[str]) -> dict[str, str]:
+    names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
+    return {name: _colour(number) for number, name in enumerate(names)}
 
 
 def _colour(number: int) -> str:

@@ -71,7 +71,10 @@ def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
             "`teasim segment fit` made.",
         ),
         ({"score": "luck"}, "Unknown score 'luck'; choose norm, equation3."),
-        ({"solver": "exact"}, "Unknown solver 'exact'; choose annealed."),
+        (
+            {"solver": "magic"},
+            "Unknown solver 'magic'; choose annealed, alternating, exact, published.",
+        ),
         ({"groups": "7"}, "Unknown number of groups '7'; choose auto, 1, 2, 3."),
         (
             {"background": "flow"},
