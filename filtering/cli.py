@@ -31,6 +31,14 @@ class FilterArguments:
     published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
     """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
+    threshold: str = "auto"
+    """How the threshold is found: auto (the score's own rule), or the mid-points between groups of
+    weights by kmeans, gmm or minibatch."""
+    precedence: Path | None = None
+    """File of lines 'a before b' (or a JSON list of pairs): no other order counts then. Of norm."""
+    tolerance: float = 0.0
+    """How much what a minority does is let pass, 0 to below 1; 0.2 spares shared legal orders. Of
+    the score norm."""
     camera: tuple[str, ...] = field(default=())
     """Cameras whose pictures are used; the main one if none is named."""
     frames_per_segment: int = 64
@@ -137,6 +145,7 @@ def run(arguments: FilterArguments) -> int:
     from filtering.demo_filter import DemoFilter, FilterConfig
     from filtering.output import check_output, write_filter_output
     from filtering.segmentation.sequence_pool import SequencePool, open_source
+    from filtering.weights.precedence import read_precedence
     from teasim import parallel
 
     if not 0.0 <= arguments.max_flagged <= 1.0:
@@ -146,6 +155,9 @@ def run(arguments: FilterArguments) -> int:
         score=arguments.score,
         solver=arguments.solver,
         groups=arguments.groups,
+        threshold=arguments.threshold,
+        precedence=read_precedence(arguments.precedence) if arguments.precedence else (),
+        tolerance=arguments.tolerance,
         cameras=arguments.camera,
         frames_per_segment=arguments.frames_per_segment,
         background=arguments.background,

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
@@ -18,8 +18,9 @@ from filtering.frames import chosen_cameras
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.segmentation.sequence_pool import SequencePool, Source
-from filtering.thresholds import GROUPS
+from filtering.thresholds import GROUPS, METHODS, probability_incorrect
 from filtering.verdict import Evidence, Rule, Verdict, judge_named
+from filtering.weights.precedence import Pairs
 from filtering.weights.solvers import solver_named
 from teasim.errors import ConfigError
 from teasim.pool import Pool
@@ -48,6 +49,14 @@ class FilterConfig:
     published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
     """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
+    threshold: str = "auto"
+    """How the threshold is found: auto (the score's own rule), or the mid-points between groups of
+    weights by kmeans, gmm or minibatch."""
+    precedence: Pairs = ()
+    """Pairs (a, b) of sub-tasks, a before b: if there are any, no other order counts. Of norm."""
+    tolerance: float = 0.0
+    """How much what a minority does is let pass, 0 to below 1; 0.2 spares shared legal orders. Of
+    the score norm."""
     cameras: tuple[str, ...] = ()
     """Cameras whose pictures are used; empty means the main one."""
     frames_per_segment: int = 64
@@ -73,6 +82,19 @@ class FilterConfig:
             raise ConfigError(
                 f"Unknown number of groups '{self.groups}'; choose {', '.join(GROUPS)}."
             )
+        if self.threshold != "auto" and self.threshold not in METHODS:
+            raise ConfigError(
+                f"Unknown threshold '{self.threshold}'; choose auto, {', '.join(METHODS)}."
+            )
+        self._check_numbers()
+        if self.score != "norm" and (self.precedence or self.tolerance):
+            raise ConfigError(
+                f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
+            )
+
+    def _check_numbers(self) -> None:
+        if not 0.0 <= self.tolerance < 1.0:
+            raise ConfigError(f"tolerance is {self.tolerance}; choose a share from 0 to below 1.")
         if self.frames_per_segment < 1:
             raise ConfigError(f"frames_per_segment is {self.frames_per_segment}; choose 1 or more.")
         if not 0.0 < self.trusted_share < 1.0:
@@ -89,6 +111,7 @@ class DemoFilter:
     After `fit`, in the order of `pool.episodes`:
         weights_ (D,): in [0, 1], 1 for a usual demonstration.
         losses_ (D,): surprise [nats], higher is worse.
+        probabilities_ (D,): of being incorrect, see `thresholds.probability_incorrect`.
         flagged_ (D,): True where it is called incorrect.
         groups_ (D,): group, 0 is the best.
         reasons_: a sentence for each flagged demonstration, else "".
@@ -103,6 +126,7 @@ class DemoFilter:
 
     weights_: NDArray[np.float64]
     losses_: NDArray[np.float64]
+    probabilities_: NDArray[np.float64]
     flagged_: NDArray[np.bool_]
     groups_: NDArray[np.int64]
     reasons_: tuple[str, ...]
@@ -208,12 +232,13 @@ class DemoFilter:
         return reduce_features(features)
 
     def _rule(self) -> Rule:
-        config = self.config
-        return Rule(config.groups, config.solver, config.trusted_share, config.ridge)
+        names = [field.name for field in fields(Rule)]
+        return Rule(**{name: getattr(self.config, name) for name in names})
 
     def _learn(self, verdict: Verdict) -> None:
         self.weights_ = verdict.weights
         self.losses_ = verdict.losses
+        self.probabilities_ = probability_incorrect(verdict.losses)
         self.trust_ = verdict.trust
         self.objective_ = verdict.objective
         self.groups_ = verdict.grouping.groups

@@ -9,6 +9,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from filtering.demo_filter import DemoFilter
 from filtering.explain import Clock
 from filtering.report import ReportSection, render_report
@@ -22,8 +25,14 @@ from teasim.pool.weight_table import write_weight_table
 
 FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
 """What an output folder holds."""
-PACKAGES = ("teasim", "numpy", "scipy", "torch", "opencv-python-headless")
+PACKAGES = ("teasim", "numpy", "scipy", "scikit-learn", "torch", "opencv-python-headless")
 """Packages whose versions are written down, because weights may depend on them."""
+
+PROBABILITY = (
+    "share of the upper of two Gaussians of one variance fitted to sqrt(loss), times the "
+    "probability by BIC that there are two"
+)
+"""How probability_incorrect comes about."""
 
 
 def check_output(out: Path, source: Path, *, overwrite: bool) -> None:
@@ -116,11 +125,15 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "threshold": fitted.threshold_,
         "objective": fitted.objective_,
         "trusted": float(fitted.trust_.sum()),
-        "trust": {
-            row.demo_id: float(w) for row, w in zip(fitted.table(), fitted.trust_, strict=True)
-        },
+        "trust": _by_demo(fitted, fitted.trust_),
+        "probability_incorrect": _by_demo(fitted, fitted.probabilities_),
+        "probability_is": PROBABILITY,
         "seconds": {stage: round(spent, 3) for stage, spent in fitted.timings_.items()},
     }
+
+
+def _by_demo(fitted: DemoFilter, values: NDArray[np.float64]) -> dict[str, float]:
+    return {row.demo_id: float(v) for row, v in zip(fitted.table(), values, strict=True)}
 
 
 def video_list(pool: SequencePool, indexes: Sequence[int], purpose: str) -> str:

@@ -18,6 +18,7 @@ from filtering.findings import Findings, Places, find_departures, find_surprises
 from filtering.sequence import transitions
 from filtering.thresholds import Grouping, group_weights
 from filtering.weights.norm_score import near_and_far, score_steps
+from filtering.weights.precedence import Pairs, precedence_graph
 from filtering.weights.problem import Problem
 from filtering.weights.score import score
 from filtering.weights.solvers import solver_named
@@ -68,9 +69,12 @@ class Rule:
     """How the evidence is to be judged; the settings are those of the filter."""
 
     groups: str
+    threshold: str
     solver: str
     trusted_share: float
     ridge: float
+    precedence: Pairs
+    tolerance: float
 
 
 @dataclass(frozen=True)
@@ -96,14 +100,17 @@ Judge = Callable[[Evidence, Rule], Verdict]
 
 def by_norm(evidence: Evidence, rule: Rule) -> Verdict:
     """Judge by what most of the pool does (the default score)."""
-    found = score_steps(evidence.counts)
+    counts = evidence.counts
+    if rule.precedence:
+        counts = counts.restricted(precedence_graph(rule.precedence, evidence.subtasks))
+    found = score_steps(counts, tolerance=rule.tolerance)
     losses = found.losses
     cut = cut_of(losses)
     weights = 1 / (1 + (losses / cut) ** 2)  # one half at the cut
     flagged = losses > cut
     grouping = Grouping(flagged.astype(np.int64), 0.5 * flagged.any())
-    if rule.groups != "auto":
-        grouping = group_weights(weights, rule.groups)
+    if (rule.groups, rule.threshold) != ("auto", "auto"):
+        grouping = group_weights(weights, rule.groups, _method(rule))
     findings = find_departures(found, evidence.labels, evidence.places)
     return Verdict(losses, weights, grouping, found.trust, findings)
 
@@ -117,11 +124,15 @@ def by_equation_3(evidence: Evidence, rule: Rule) -> Verdict:
     return Verdict(
         losses=found.losses,
         weights=found.weights,
-        grouping=group_weights(found.weights, rule.groups),
+        grouping=group_weights(found.weights, rule.groups, _method(rule)),
         trust=solved.weights_,
         findings=find_surprises(rows, found, evidence.labels, evidence.places),
         objective=solved.objective_,
     )
+
+
+def _method(rule: Rule) -> str:
+    return "kmeans" if rule.threshold == "auto" else rule.threshold
 
 
 def cut_of(losses: NDArray[np.float64]) -> float:

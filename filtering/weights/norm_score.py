@@ -64,13 +64,20 @@ class NormScore:
     """(T,) how much rarer each sub-task is in the other population [probability]."""
 
 
-def score_steps(counts: StepCounts, seed: int = 0) -> NormScore:
-    """Score the demonstrations of a pool; `seed` draws the starts of the mixture."""
+def score_steps(counts: StepCounts, seed: int = 0, tolerance: float = 0.0) -> NormScore:
+    """Score the demonstrations of a pool.
+
+    Args:
+        counts: what they do.
+        seed: draws the starts of the mixture.
+        tolerance: b in [0, 1): w becomes (1 - b) w + b, so that what a minority does is less of a
+            surprise; about 0.2 spares legal orders that a few share.
+    """
     populations = find_populations(counts, seed)
     first = _score(counts, populations.norm)
     trimmed = _trim(first.losses)
     second = _score(counts, trimmed)
-    trust = _refit(second.losses, trimmed)
+    trust = (1 - tolerance) * _refit(second.losses, trimmed) + tolerance
     final = _score(counts, trust)
     systematic = np.clip(populations.lack - 1, 0, 1) * np.clip(
         populations.log_ratio, 0, LARGEST_RATIO
@@ -85,7 +92,7 @@ def score_steps(counts: StepCounts, seed: int = 0) -> NormScore:
 
 def _score(counts: StepCounts, trust: Array) -> NormScore:
     omitted = (1 - counts.occurs) * np.maximum(_log_odds(counts.occurs, 1.0, trust), 0)
-    order = np.maximum(_log_odds(counts.before, counts.both, trust), 0)
+    order = np.maximum(_log_odds(counts.before, counts.both, trust), 0) * counts.binding
     misplaced = order * (1 - counts.before) * counts.both
     broken = misplaced.reshape(counts.n_demos, -1)
     worst = broken.max(axis=1, initial=0.0)
