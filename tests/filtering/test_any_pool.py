@@ -27,7 +27,7 @@ def evidence(orders: list[list[int]], n_subtasks: int = 6) -> Evidence:
 
 @pytest.mark.parametrize("name", JUDGES)
 @given(orders=ORDERS, seed=st.integers(0, 9))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=3, deadline=None)
 def test_every_score_judges_every_pool(name: str, orders: list[list[int]], seed: int) -> None:
     verdict = JUDGES[name](evidence(orders), RULE)
     for values in (verdict.losses, verdict.weights, verdict.trust):
