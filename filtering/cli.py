@@ -16,21 +16,32 @@ class FilterArguments:
     """Give every demonstration of a pool a weight and flag the incorrect ones."""
 
     source: Annotated[Path, tyro.conf.Positional]
-    """The pool: a LeRobot v3.0 data set with labelled sub-tasks."""
+    """The pool: a LeRobot v3.0 data set with labelled sub-tasks, or an MS-TCN folder (labels per
+    frame in groundTruth/*.txt or predictions/*.txt, mapping.txt) without videos."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
     segmenter: str = "truth"
     """Where segments come from: truth (the labels logged in the pool), clustering (the videos
-    alone, without labels), or the folder of a segmenter that `teasim segment fit` made."""
+    alone, without labels), predictions (those stored in an MS-TCN folder), or the folder of a
+    segmenter that `teasim segment fit` made."""
     subtasks: str = "auto"
     """Number of sub-tasks that clustering looks for; auto finds it out."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
     solver: str = "annealed"
-    """Solver of equation 3: annealed."""
+    """Solver of equation 3: annealed, alternating, exact (24 different demonstrations at most) or
+    published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
     """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
+    threshold: str = "auto"
+    """How the threshold is found: auto (the score's own rule), or the mid-points between groups of
+    weights by kmeans, gmm or minibatch."""
+    precedence: Path | None = None
+    """File of lines 'a before b' (or a JSON list of pairs): no other order counts then. Of norm."""
+    tolerance: float = 0.0
+    """How much what a minority does is let pass, 0 to below 1; 0.2 spares shared legal orders. Of
+    the score norm."""
     camera: tuple[str, ...] = field(default=())
     """Cameras whose pictures are used; the main one if none is named."""
     frames_per_segment: int = 64
@@ -40,6 +51,8 @@ class FilterArguments:
     features: str = "pooled"
     """What describes a segment: pooled (nothing is learned), or the folder of a segmenter that
     `teasim segment fit --features` made."""
+    fps: float | None = None
+    """Frames (lines) per second of an MS-TCN folder; times are told in frames if not given."""
     max_flagged: float = 1.0
     """Exit with 1 when more than this share of the demonstrations is flagged, 0 to 1."""
     jobs: int = 0
@@ -139,8 +152,9 @@ def run(arguments: FilterArguments) -> int:
     """
     from filtering.demo_filter import DemoFilter, FilterConfig
     from filtering.output import check_output, write_filter_output
+    from filtering.segmentation.sequence_pool import SequencePool, open_source
+    from filtering.weights.precedence import read_precedence
     from teasim import parallel
-    from teasim.pool import Pool
 
     if not 0.0 <= arguments.max_flagged <= 1.0:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
@@ -150,12 +164,15 @@ def run(arguments: FilterArguments) -> int:
         score=arguments.score,
         solver=arguments.solver,
         groups=arguments.groups,
+        threshold=arguments.threshold,
+        precedence=read_precedence(arguments.precedence) if arguments.precedence else (),
+        tolerance=arguments.tolerance,
         cameras=arguments.camera,
         frames_per_segment=arguments.frames_per_segment,
         background=arguments.background,
         features=arguments.features,
     )
-    pool = Pool.open(arguments.source)
+    pool = open_source(arguments.source, arguments.fps)
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)
     jobs = arguments.jobs or parallel.default_jobs()
     fitted = DemoFilter(config).fit(pool, jobs=jobs)
@@ -166,7 +183,8 @@ def run(arguments: FilterArguments) -> int:
         print(f"{found} sub-tasks, recognised with a mean probability of {confidence:.2f}.")
     for row in fitted.table():
         if row.flagged:
-            print(f"video {row.episode_index}  weight {row.weight:.2f}  {row.reason}")
+            name = row.demo_id if isinstance(pool, SequencePool) else f"video {row.episode_index}"
+            print(f"{name}  weight {row.weight:.2f}  {row.reason}")
     share = float(fitted.flagged_.mean())
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
     print(f"report: {arguments.out / 'report.html'}")

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.background import subtraction_named
-from filtering.explain import Finding, explain, find_strange_steps
+from filtering.explain import Finding, explain
 from filtering.features.description import POOLED, check_description, describe_segments
 from filtering.features.reduction import reduce_features
 from filtering.frames import chosen_cameras, main_camera
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
-from filtering.sequence import transitions
-from filtering.thresholds import GROUPS
-from filtering.verdict import Verdict, judge_named
-from filtering.weights.problem import Problem
-from filtering.weights.score import score
-from filtering.weights.solvers import Solution, solver_named
-from filtering.weights.steps import StepCounts, StepList, count_steps
+from filtering.segmentation.sequence_pool import SequencePool, Source
+from filtering.thresholds import GROUPS, METHODS, probability_incorrect
+from filtering.verdict import Evidence, Rule, Verdict, judge_named
+from filtering.weights.precedence import Pairs
+from filtering.weights.solvers import solver_named
 from teasim.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow
 
 FEWEST_DEMOS = 3
 """With fewer demonstrations there is no majority to agree with."""
+ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features")
+"""Settings that mean nothing for step lists."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,26 @@ class FilterConfig:
 
     segmenter: str = "truth"
     """Where segments come from: truth (the labels logged in the pool), clustering (the videos
-    alone), or the folder of a fitted segmenter; the last two read no logged label."""
+    alone), predictions (those stored in an MS-TCN folder), or the folder of a fitted segmenter; all
+    but truth read no logged label."""
     subtasks: str = "auto"
     """Number of sub-tasks that clustering looks for; auto finds it out."""
     score: str = "norm"
     """What demonstrations are judged by: norm (omissions, order and next steps against what most
     of the pool does) or equation3 (the paper's next-step model)."""
     solver: str = "annealed"
-    """Solver of equation 3: annealed."""
+    """Solver of equation 3: annealed, alternating, exact (24 different demonstrations at most) or
+    published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
     """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
+    threshold: str = "auto"
+    """How the threshold is found: auto (the score's own rule), or the mid-points between groups of
+    weights by kmeans, gmm or minibatch."""
+    precedence: Pairs = ()
+    """Pairs (a, b) of sub-tasks, a before b: if there are any, no other order counts. Of norm."""
+    tolerance: float = 0.0
+    """How much what a minority does is let pass, 0 to below 1; 0.2 spares shared legal orders. Of
+    the score norm."""
     cameras: tuple[str, ...] = ()
     """Cameras whose pictures are used; empty means the main one."""
     frames_per_segment: int = 64
@@ -77,6 +87,19 @@ class FilterConfig:
             raise ConfigError(
                 f"Unknown number of groups '{self.groups}'; choose {', '.join(GROUPS)}."
             )
+        if self.threshold != "auto" and self.threshold not in METHODS:
+            raise ConfigError(
+                f"Unknown threshold '{self.threshold}'; choose auto, {', '.join(METHODS)}."
+            )
+        self._check_numbers()
+        if self.score != "norm" and (self.precedence or self.tolerance):
+            raise ConfigError(
+                f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
+            )
+
+    def _check_numbers(self) -> None:
+        if not 0.0 <= self.tolerance < 1.0:
+            raise ConfigError(f"tolerance is {self.tolerance}; choose a share from 0 to below 1.")
         if self.frames_per_segment < 1:
             raise ConfigError(f"frames_per_segment is {self.frames_per_segment}; choose 1 or more.")
         if not 0.0 < self.trusted_share < 1.0:
@@ -93,13 +116,14 @@ class DemoFilter:
     After `fit`, in the order of `pool.episodes`:
         weights_ (D,): in [0, 1], 1 for a usual demonstration.
         losses_ (D,): surprise [nats], higher is worse.
+        probabilities_ (D,): of being incorrect, see `thresholds.probability_incorrect`.
         flagged_ (D,): True where it is called incorrect.
         groups_ (D,): group, 0 is the best.
         reasons_: a sentence for each flagged demonstration, else "".
-        findings_: strange steps of each demonstration, the worst first.
+        findings_: strange steps of each demonstration, the one that is named first.
         threshold_: weight below which a demonstration is flagged, 0 when nothing is.
-        trust_ (D,): w of equation 3, in [0, 1], sum M.
-        objective_: value of equation 3 [nats per step]; trusted_: M.
+        trust_ (D,): how much it shapes what is usual, in [0, 1]; w of equation 3 sums to M.
+        objective_: value of equation 3 [nats per step]; None for another score.
         segments_: the segments used.
         cameras_: the cameras used.
         timings_: seconds per stage.
@@ -107,14 +131,14 @@ class DemoFilter:
 
     weights_: NDArray[np.float64]
     losses_: NDArray[np.float64]
+    probabilities_: NDArray[np.float64]
     flagged_: NDArray[np.bool_]
     groups_: NDArray[np.int64]
     reasons_: tuple[str, ...]
     findings_: tuple[tuple[Finding, ...], ...]
     threshold_: float
     trust_: NDArray[np.float64]
-    objective_: float
-    trusted_: float
+    objective_: float | None
     segments_: Segmentation
     cameras_: tuple[str, ...]
     timings_: dict[str, float]
@@ -123,7 +147,7 @@ class DemoFilter:
         """Prepare a filter; without `config` with the default settings."""
         self.config = FilterConfig() if config is None else config
 
-    def fit(self, pool: Pool, *, jobs: int = 1) -> Self:
+    def fit(self, pool: Source, *, jobs: int = 1) -> Self:
         """Weigh the demonstrations of `pool`, which is not modified.
 
         Args:
@@ -131,46 +155,26 @@ class DemoFilter:
             jobs: worker processes that look at videos; the result does not depend on it.
 
         Raises:
-            ConfigError: the pool has too few demonstrations, or no camera of that name.
+            ConfigError: the pool has too few demonstrations, no camera of that name, or no pictures
+                where a setting is about them.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
-        config = self.config
         self.timings_ = {}
         self._check(pool)
-        self.cameras_ = chosen_cameras(pool, config.cameras) or (main_camera(pool),)
+        self.cameras_ = self._cameras(pool)
         with self._timed("segments"):
-            segmenter = segmenter_named(config.segmenter, config.subtasks, self.cameras_)
-            self.segments_ = segmenter(pool, jobs=jobs)
+            self.segments_ = self._segments(pool, jobs)
         with self._timed("features"):
-            features = describe_segments(
-                config.features,
-                pool,
-                self.segments_.spans,
-                cameras=self.cameras_,
-                frames_per_segment=config.frames_per_segment,
-                background=config.background,
-                jobs=jobs,
-            )
+            states = self._states(pool, jobs)
         # The matrices are small: more BLAS threads only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
-            rows = transitions(
-                reduce_features(features), self.segments_.labels(), len(self.segments_.subtasks)
-            )
-            problem = Problem(rows, config.ridge)
-            self.trusted_ = config.trusted_share * len(pool.episodes)
-            solution = solver_named(config.solver)(problem, self.trusted_)
-            surprises = score(problem, solution)
-            judge = judge_named(config.score)
-            self._learn(solution, judge(self._counts(), surprises, config.groups))
-        findings = find_strange_steps(
-            rows, surprises, self.segments_.spans, self.segments_.subtasks
-        )
-        self.findings_ = tuple(findings)
+            evidence = Evidence(self.segments_.subtasks, self.segments_.spans, states)
+            self._learn(judge_named(self.config.score)(evidence, self._rule()))
         self.reasons_ = tuple(
             explain(found, pool.fps) if flagged else ""
-            for found, flagged in zip(findings, self.flagged_, strict=True)
+            for found, flagged in zip(self.findings_, self.flagged_, strict=True)
         )
-        self._identify(pool)
+        self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
         return self
 
     def table(self) -> tuple[WeightRow, ...]:
@@ -188,7 +192,7 @@ class DemoFilter:
             for row, (demo_id, index) in enumerate(self._identities)
         )
 
-    def _check(self, pool: Pool) -> None:
+    def _check(self, pool: Source) -> None:
         count = len(pool.episodes)
         if count < FEWEST_DEMOS:
             raise ConfigError(
@@ -201,24 +205,53 @@ class DemoFilter:
                 "demonstrations."
             )
 
-    def _counts(self) -> StepCounts:
-        demos = [
-            StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
-            for labels, spans in zip(self.segments_.labels(), self.segments_.spans, strict=True)
-        ]
-        return count_steps(demos, len(self.segments_.subtasks))
+    def _cameras(self, pool: Source) -> tuple[str, ...]:
+        """Return the cameras to look at, none where there are no pictures."""
+        if isinstance(pool, Pool):
+            return chosen_cameras(pool, self.config.cameras) or (main_camera(pool),)
+        for setting in ABOUT_PICTURES:
+            if getattr(self.config, setting) != getattr(FilterConfig, setting):
+                raise ConfigError(
+                    f"'{pool.root}' has no pictures, which {setting} is about; leave it out."
+                )
+        return ()
 
-    def _learn(self, solution: Solution, verdict: Verdict) -> None:
+    def _segments(self, pool: Source, jobs: int) -> Segmentation:
+        if isinstance(pool, SequencePool):
+            return pool.segments(self.config.segmenter)
+        segmenter = segmenter_named(self.config.segmenter, self.config.subtasks, self.cameras_)
+        return segmenter(pool, jobs=jobs)
+
+    def _states(self, pool: Source, jobs: int) -> list[NDArray[np.float64]]:
+        """Return per demonstration (q, N): what its segments look like, else which they are."""
+        if isinstance(pool, SequencePool):
+            eye = np.eye(len(self.segments_.subtasks))
+            return [eye[labels] for labels in self.segments_.labels()]
+        features = describe_segments(
+            self.config.features,
+            pool,
+            self.segments_.spans,
+            cameras=self.cameras_,
+            frames_per_segment=self.config.frames_per_segment,
+            background=self.config.background,
+            jobs=jobs,
+        )
+        return reduce_features(features)
+
+    def _rule(self) -> Rule:
+        names = [field.name for field in fields(Rule)]
+        return Rule(**{name: getattr(self.config, name) for name in names})
+
+    def _learn(self, verdict: Verdict) -> None:
         self.weights_ = verdict.weights
         self.losses_ = verdict.losses
-        self.trust_ = solution.weights
-        self.objective_ = solution.objective
+        self.probabilities_ = probability_incorrect(verdict.losses)
+        self.trust_ = verdict.trust
+        self.objective_ = verdict.objective
         self.groups_ = verdict.grouping.groups
         self.flagged_ = verdict.grouping.flagged
         self.threshold_ = verdict.grouping.threshold
-
-    def _identify(self, pool: Pool) -> None:
-        self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
+        self.findings_ = verdict.findings
 
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:

@@ -1,20 +1,39 @@
-"""Which step of a demonstration is strange, where in the video, and why, in one sentence."""
+"""One sentence about a demonstration: which step is strange, where in the video, and why."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from filtering.sequence import Transitions
-from filtering.weights.score import Score
 from teasim.pool import Span
-
-NOTABLE = 1.0
-"""Smallest surprise worth a mark on the timeline [nats]."""
 
 GRAVE = 0.5
 """Share of the worst surprise from which a finding may be the one that is named."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Frames as times of the video; as frame numbers where the frame rate is not known."""
+
+    fps: float | None
+    """Frames per second."""
+
+    @property
+    def unit(self) -> str:
+        """What `time` counts."""
+        return "frames" if self.fps is None else "s"
+
+    def time(self, frame: int) -> float:
+        """Return when a frame begins [unit]."""
+        return frame / (self.fps or 1.0)
+
+    def at(self, frame: int) -> str:
+        """Return that as words."""
+        return f"frame {frame}" if self.fps is None else f"{self.time(frame):.1f} s"
+
+    def during(self, span: Span) -> str:
+        """Return from when to when a segment lasts."""
+        if self.fps is None:
+            return f"frames {span.start}-{span.stop}"
+        return f"{self.time(span.start):.1f}-{self.time(span.stop):.1f} s"
 
 
 @dataclass(frozen=True)
@@ -32,138 +51,50 @@ class Finding:
     missing: bool
     """Whether the expected sub-task does not occur anywhere in the demonstration."""
     surprise: float
-    """Surprise of the step and of the omission together [nats]."""
+    """What it adds to the loss [nats]."""
+    came: Span | None = None
+    """Where the expected sub-task came instead, later; None where it did not."""
 
 
-def find_strange_steps(
-    rows: Transitions,
-    score: Score,
-    segments: Sequence[tuple[Span, ...]],
-    subtasks: Sequence[str],
-) -> list[tuple[Finding, ...]]:
-    """Return per demonstration its findings of NOTABLE surprise or more, the worst first."""
-    order = usual_order(rows, score.weights)
-    return [
-        _findings_of(_Steps(rows, score, demo), spans, order, subtasks)
-        for demo, spans in enumerate(segments)
-    ]
-
-
-def usual_order(rows: Transitions, weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (T, T): how often sub-task a first comes before b where both occur, 0.5 if never.
+def explain(findings: Sequence[Finding], fps: float | None) -> str:
+    """Return one sentence about the first finding, and what else is missing.
 
     Args:
-        rows: the pool.
-        weights: (D,) how much each demonstration counts.
+        findings: of one demonstration, the one to name first.
+        fps: frames per second; None where it is not known.
     """
-    before = np.full((rows.n_subtasks, rows.n_subtasks), 0.5)
-    both = np.ones_like(before)
-    for demo in range(rows.n_demos):
-        labels = rows.nexts[rows.demos == demo][:-1].tolist()
-        first = np.full(rows.n_subtasks, np.inf)
-        for position in range(len(labels) - 1, -1, -1):
-            first[labels[position]] = position
-        occurs = np.isfinite(first)
-        both += weights[demo] * (occurs[:, None] & occurs[None, :])
-        before += weights[demo] * ((first[:, None] < first[None, :]) & occurs[None, :])
-    return before / both
-
-
-class _Steps:
-    """What the score says about one demonstration."""
-
-    def __init__(self, rows: Transitions, score: Score, demo: int) -> None:
-        mine = rows.demos == demo
-        self.labels: list[int] = rows.nexts[mine][:-1].tolist()
-        self.expected: list[int] = score.log_probabilities[mine].argmax(axis=1).tolist()
-        self.surprise: list[float] = score.step[mine].tolist()
-        omission = score.omission[demo]
-        self.omitted = {
-            label: float(omission[label]) for label in np.flatnonzero(omission >= NOTABLE).tolist()
-        }
-
-    def place_of(self, omitted: int, order: NDArray[np.float64]) -> int:
-        """Return the row at which most of the other sub-tasks say an omitted one belongs."""
-        agreement = [
-            sum(order[label, omitted] for label in self.labels[:row])
-            + sum(order[omitted, label] for label in self.labels[row:])
-            for row in range(len(self.labels) + 1)
-        ]
-        return int(np.argmax(agreement))
-
-
-def _findings_of(
-    steps: _Steps, spans: tuple[Span, ...], order: NDArray[np.float64], subtasks: Sequence[str]
-) -> tuple[Finding, ...]:
-    """Join each omission to the strange step at its place, if it is what was expected there."""
-    found = []
-    explained = set()
-    for label, omission in steps.omitted.items():
-        row = steps.place_of(label, order)
-        surprise = omission
-        if steps.expected[row] == label:
-            surprise += steps.surprise[row]
-            explained.add(row)
-        found.append(_finding(row, label, spans, subtasks, True, surprise))
-    for row, surprise in enumerate(steps.surprise):
-        if surprise >= NOTABLE and row not in explained:
-            label = steps.expected[row]
-            missing = label in steps.omitted
-            found.append(_finding(row, label, spans, subtasks, missing, surprise))
-    return tuple(sorted(found, key=lambda finding: -finding.surprise))
-
-
-def _finding(
-    row: int,
-    label: int,
-    spans: tuple[Span, ...],
-    subtasks: Sequence[str],
-    missing: bool,
-    surprise: float,
-) -> Finding:
-    seen = spans[row] if row < len(spans) else None
-    return Finding(
-        expected=subtasks[label] if label < len(subtasks) else None,
-        seen=seen.subtask if seen else None,
-        after=spans[row - 1] if row else None,
-        frame=seen.start if seen else spans[-1].stop,
-        missing=missing,
-        surprise=surprise,
-    )
-
-
-def explain(findings: Sequence[Finding], fps: float) -> str:
-    """Return one sentence about the gravest finding, and what else is missing."""
     if not findings:
         return (
             "No single step stands out, but all steps together are less usual than those of the "
             "kept demonstrations."
         )
-    # One displaced step makes later steps strange as well: of those that matter, name the first.
-    worst = min(gravest(findings), key=lambda item: (item.frame, -item.surprise))
-    sentence = f"{_place(worst, fps)} {_expectation(worst)}, {_sight(worst, fps)}"
-    if worst.missing:
-        sentence += f"; '{worst.expected}' is missing from the whole video"
+    clock = Clock(fps)
+    named = findings[0]
+    sentence = f"{_place(named, clock)} {_expectation(named)}, {_sight(named, clock)}"
+    if named.missing:
+        sentence += f"; '{named.expected}' is missing from the whole video"
+    elif named.came is not None:
+        sentence += f"; '{named.expected}' came later ({clock.during(named.came)})"
     others = {item.expected: item for item in reversed(findings) if item.missing}
-    others.pop(worst.expected, None)
+    others.pop(named.expected, None)
     if others:
         where = ", ".join(
-            f"'{item.expected}' (expected at {_at(item, fps)})" for item in others.values()
+            f"'{item.expected}' (expected at {clock.at(item.frame)})" for item in others.values()
         )
-        sentence += f"; {'also missing' if worst.missing else 'missing'}: {where}"
+        sentence += f"; {'also missing' if named.missing else 'missing'}: {where}"
     return sentence + "."
 
 
 def gravest(findings: Sequence[Finding]) -> list[Finding]:
     """Return the findings at least GRAVE times as surprising as the worst one."""
-    return [item for item in findings if item.surprise >= GRAVE * findings[0].surprise]
+    worst = max(item.surprise for item in findings)
+    return [item for item in findings if item.surprise >= GRAVE * worst]
 
 
-def _place(finding: Finding, fps: float) -> str:
+def _place(finding: Finding, clock: Clock) -> str:
     if finding.after is None:
         return "At the start of the video"
-    span = finding.after
-    return f"After {span.subtask} ({span.start / fps:.1f}-{span.stop / fps:.1f} s)"
+    return f"After {finding.after.subtask} ({clock.during(finding.after)})"
 
 
 def _expectation(finding: Finding) -> str:
@@ -172,11 +103,7 @@ def _expectation(finding: Finding) -> str:
     return f"'{finding.expected}' was expected"
 
 
-def _sight(finding: Finding, fps: float) -> str:
+def _sight(finding: Finding, clock: Clock) -> str:
     if finding.seen is None:
-        return f"but the video ends at {_at(finding, fps)}"
-    return f"'{finding.seen}' was seen at {_at(finding, fps)}"
-
-
-def _at(finding: Finding, fps: float) -> str:
-    return f"{finding.frame / fps:.1f} s"
+        return f"but the video ends at {clock.at(finding.frame)}"
+    return f"'{finding.seen}' was seen at {clock.at(finding.frame)}"

@@ -29,8 +29,8 @@ class FrameSource:
     cameras: tuple[str, ...]
     """Cameras whose features are put side by side."""
     rate: float = 2.5
-    """Moments looked at per second [Hz]: every fourth frame of a video at 10 frames/s. Twice as many
-    cost twice the time and make segments of tea-making no better."""
+    """Moments looked at per second [Hz]: every fourth frame of a video at 10 frames/s. Twice as
+    many take twice the time and make segments of tea-making no better."""
 
     def __post_init__(self) -> None:
         """Refuse a source without pictures.

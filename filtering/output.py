@@ -9,10 +9,15 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from filtering.demo_filter import DemoFilter
+from filtering.explain import Clock
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
+from filtering.segmentation.sequence_pool import SequencePool, Source
 from teasim.errors import ConfigError, TeasimError
 from teasim.pool import Pool
 from teasim.pool.files import write_json, write_text
@@ -20,8 +25,14 @@ from teasim.pool.weight_table import write_weight_table
 
 FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
 """What an output folder holds."""
-PACKAGES = ("teasim", "numpy", "scipy", "torch", "opencv-python-headless")
+PACKAGES = ("teasim", "numpy", "scipy", "scikit-learn", "torch", "opencv-python-headless")
 """Packages whose versions are written down, because weights may depend on them."""
+
+PROBABILITY = (
+    "share of the upper of two Gaussians of one variance fitted to sqrt(loss), times the "
+    "probability by BIC that there are two"
+)
+"""How probability_incorrect comes about."""
 
 
 def check_output(out: Path, source: Path, *, overwrite: bool) -> None:
@@ -56,7 +67,7 @@ def check_output(out: Path, source: Path, *, overwrite: bool) -> None:
 
 def write_filter_output(
     out: Path | str,
-    pool: Pool,
+    pool: Source,
     fitted: DemoFilter,
     *,
     sections: Sequence[ReportSection] = (),
@@ -84,8 +95,8 @@ def write_filter_output(
         folder.mkdir(parents=True, exist_ok=True)
         write_weight_table(folder / "weights.csv", rows)
         write_json(folder / "filter.json", run_record(fitted, pool))
-        write_text(folder / "keep.txt", keep_list(pool, keep))
-        write_text(folder / "exclude.txt", exclude_list(pool, exclude))
+        write_text(folder / "keep.txt", _keep_text(pool, keep))
+        write_text(folder / "exclude.txt", _exclude_text(pool, exclude))
     except OSError as error:
         raise TeasimError(f"The output '{out}' cannot be written: {error.strerror}.") from error
     render_report(
@@ -94,10 +105,11 @@ def write_filter_output(
         threshold=fitted.threshold_,
         subtasks=fitted.segments_.subtasks,
         sections=sections,
+        unit=Clock(pool.fps).unit,
     )
 
 
-def run_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any]:
+def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
     """Return what filter.json holds: enough to repeat the run and to check its result."""
     return {
         "config": asdict(fitted.config),
@@ -113,12 +125,38 @@ def run_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any]:
         "groups": int(fitted.groups_.max()) + 1,
         "threshold": fitted.threshold_,
         "objective": fitted.objective_,
-        "trusted": fitted.trusted_,
-        "trust": {
-            row.demo_id: float(w) for row, w in zip(fitted.table(), fitted.trust_, strict=True)
-        },
+        "trusted": float(fitted.trust_.sum()),
+        "trust": _by_demo(fitted, fitted.trust_),
+        "probability_incorrect": _by_demo(fitted, fitted.probabilities_),
+        "probability_is": PROBABILITY,
         "seconds": {stage: round(spent, 3) for stage, spent in fitted.timings_.items()},
     }
+
+
+def _by_demo(fitted: DemoFilter, values: NDArray[np.float64]) -> dict[str, float]:
+    return {row.demo_id: float(v) for row, v in zip(fitted.table(), values, strict=True)}
+
+
+def video_list(pool: SequencePool, indexes: Sequence[int], purpose: str) -> str:
+    """Return the files of an MS-TCN folder in the form of its splits, without the first lines."""
+    files = [f"{pool.episodes[index].demo_id}.txt" for index in indexes]
+    return _list(
+        files,
+        f"{len(files)} videos to {purpose}, of {pool.root}",
+        "MS-TCN:    grep -v '^#' keep.txt > splits/keep.bundle",
+    )
+
+
+def _keep_text(pool: Source, keep: Sequence[int]) -> str:
+    if isinstance(pool, SequencePool):
+        return video_list(pool, keep, "keep")
+    return keep_list(pool, keep)
+
+
+def _exclude_text(pool: Source, exclude: Sequence[int]) -> str:
+    if isinstance(pool, SequencePool):
+        return video_list(pool, exclude, "leave out")
+    return exclude_list(pool, exclude)
 
 
 def keep_list(pool: Pool, keep: Sequence[int]) -> str:
@@ -158,10 +196,10 @@ def exclude_list(pool: Pool, exclude: Sequence[int]) -> str:
     )
 
 
-def _segmentation_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any] | None:
+def _segmentation_record(fitted: DemoFilter, pool: Source) -> dict[str, Any] | None:
     """Return what inferred the segments and how good they are, where that is known."""
     found = fitted.segments_
-    if found.weights_sha256 is None:
+    if isinstance(pool, SequencePool) or found.weights_sha256 is None:
         return None
     return {
         "weights_sha256": found.weights_sha256,
@@ -169,9 +207,9 @@ def _segmentation_record(fitted: DemoFilter, pool: Pool) -> dict[str, Any] | Non
     }
 
 
-def _list(indexes: Sequence[int], *comments: str) -> str:
+def _list(entries: Sequence[int] | Sequence[str], *comments: str) -> str:
     lines = [f"# {comment}" for comment in comments]
-    return "\n".join([*lines, *map(str, indexes)]) + "\n"
+    return "\n".join([*lines, *map(str, entries)]) + "\n"
 
 
 def _json(indexes: Sequence[int]) -> str:

@@ -1,14 +1,20 @@
-"""From weights to groups: exact one-dimensional k-means and its mid-points (paper section 3.3).
+"""From weights to groups: clusters and the mid-points between them (paper section 3.3).
+
+k-means is exact, because it is one-dimensional; a Gaussian mixture and mini-batch k-means are there
+as the paper has them.
 
 The paper is told the number of groups. Here it can also be chosen from the data, one group
 included: in a clean pool nothing is flagged.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import combinations
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from teasim.errors import ConfigError
 
@@ -18,6 +24,13 @@ MIN_GAP = 0.5
 """Least distance between the mean weights of two groups for them to be two [weight]."""
 MIN_GAP_OF_THREE = 0.25
 """Least distance between neighbouring means of three groups [weight]."""
+
+LEAST_VARIANCE = 1e-4
+"""Least variance of a group of weights."""
+LEAST_ROOT_VARIANCE = 0.05
+"""Least variance of a group of sqrt(l) [nats]: a twentieth of a nat is no difference."""
+NO_SPREAD = 1e-6
+"""Values of sqrt(l) that differ by less are equal."""
 
 
 @dataclass(frozen=True)
@@ -40,34 +53,46 @@ class Grouping:
         return int(self.groups.max()) + 1
 
 
-def group_weights(weights: NDArray[np.float64], groups: str = "auto") -> Grouping:
+def group_weights(
+    weights: NDArray[np.float64], groups: str = "auto", method: str = "kmeans"
+) -> Grouping:
     """Split weights (D,) into groups and put the threshold between group 0 and group 1.
 
     Asked-for groups are fewer when there are fewer different weights than groups.
 
+    Args:
+        weights: in [0, 1].
+        groups: one of GROUPS.
+        method: one of METHODS.
+
     Raises:
-        ConfigError: `groups` is none of GROUPS, or more than there are demonstrations.
+        ConfigError: `groups` or `method` is unknown, or there are fewer demonstrations than groups.
     """
+    grouper = method_named(method)
     if groups not in GROUPS:
         raise ConfigError(f"Unknown number of groups '{groups}'; choose {', '.join(GROUPS)}.")
     if groups == "auto":
-        return _chosen_from_data(weights)
+        return _chosen_from_data(weights, grouper)
     if int(groups) > len(weights):
         raise ConfigError(
             f"{groups} groups were asked for but there are only {len(weights)} demonstrations; "
             f"choose auto or at most {len(weights)}."
         )
-    return _grouping(weights, min(int(groups), len(np.unique(weights))))
+    return grouper(weights, min(int(groups), len(np.unique(weights))))
 
 
-def _chosen_from_data(weights: NDArray[np.float64]) -> Grouping:
+Grouper = Callable[[NDArray[np.float64], int], Grouping]
+"""Splits weights (D,) into so many groups, fewer where a group would be empty."""
+
+
+def _chosen_from_data(weights: NDArray[np.float64], grouper: Grouper) -> Grouping:
     distinct = len(np.unique(weights))
-    two = _grouping(weights, min(2, distinct))
+    two = grouper(weights, min(2, distinct))
     if _smallest_gap(weights, two) < MIN_GAP:
-        return _grouping(weights, 1)
+        return grouper(weights, 1)
     if distinct < 3:
         return two
-    three = _grouping(weights, 3)
+    three = grouper(weights, 3)
     clear = _smallest_gap(weights, three) >= MIN_GAP_OF_THREE
     better = _silhouette(weights, three) > _silhouette(weights, two)
     # A third group may refine what is flagged, but must not take demonstrations from the kept ones.
@@ -75,13 +100,11 @@ def _chosen_from_data(weights: NDArray[np.float64]) -> Grouping:
     return three if clear and better and same_kept else two
 
 
-def _grouping(weights: NDArray[np.float64], count: int) -> Grouping:
+def _by_kmeans(weights: NDArray[np.float64], count: int) -> Grouping:
     """Return the exact k-means solution; equal weights always share a group."""
-    values = np.unique(weights)[::-1]
-    best = min(
-        combinations(range(1, len(values)), count - 1),
-        key=lambda cuts: _within(weights, _assign(weights, values, cuts)),
-    )
+    values, counts = np.unique(weights, return_counts=True)
+    values, counts = values[::-1], counts[::-1]
+    best = _best_cuts(values, counts.astype(np.float64), count)
     groups = _assign(weights, values, best)
     if count == 1:
         return Grouping(groups, 0.0)
@@ -90,6 +113,82 @@ def _grouping(weights: NDArray[np.float64], count: int) -> Grouping:
     lowest_kept, highest_flagged = weights[groups == 0].min(), weights[groups == 1].max()
     inside = highest_flagged < middle <= lowest_kept
     return Grouping(groups, float(middle if inside else (lowest_kept + highest_flagged) / 2))
+
+
+def _by_mixture(weights: NDArray[np.float64], count: int) -> Grouping:
+    from sklearn.mixture import GaussianMixture
+
+    model = GaussianMixture(
+        count, means_init=_kmeans_means(weights, count), reg_covar=LEAST_VARIANCE, random_state=0
+    )
+    return _between(weights, model.fit(np.sort(weights)[:, None]).means_.ravel())
+
+
+def _by_minibatch(weights: NDArray[np.float64], count: int) -> Grouping:
+    from sklearn.cluster import MiniBatchKMeans
+
+    model = MiniBatchKMeans(count, init=_kmeans_means(weights, count), n_init=1, random_state=0)
+    return _between(weights, model.fit(np.sort(weights)[:, None]).cluster_centers_.ravel())
+
+
+def _kmeans_means(weights: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    groups = _by_kmeans(weights, count).groups
+    return np.array([[weights[groups == group].mean()] for group in range(count)])
+
+
+def _between(weights: NDArray[np.float64], means: NDArray[np.float64]) -> Grouping:
+    """Cut at the mid-points of the means; a group that nobody is in is none."""
+    falling = np.sort(means)[::-1]
+    middles = (falling[1:] + falling[:-1]) / 2
+    below: NDArray[np.bool_] = weights[:, None] < middles[None, :]
+    numbers = np.count_nonzero(below, axis=1)
+    present, groups = np.unique(numbers, return_inverse=True)
+    threshold = float(middles[present[1] - 1]) if len(present) > 1 else 0.0
+    return Grouping(groups.astype(np.int64), threshold)
+
+
+METHODS: Mapping[str, Grouper] = MappingProxyType(
+    {"kmeans": _by_kmeans, "gmm": _by_mixture, "minibatch": _by_minibatch}
+)
+"""Every way of finding groups by name."""
+
+
+def method_named(name: str) -> Grouper:
+    """Return a way of finding groups.
+
+    Raises:
+        ConfigError: there is none of that name.
+    """
+    if name not in METHODS:
+        raise ConfigError(f"Unknown threshold '{name}'; choose {', '.join(METHODS)}.")
+    return METHODS[name]
+
+
+def probability_incorrect(losses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return for losses (D,) how probable it is that each demonstration is incorrect.
+
+    Two Gaussians of one variance are fitted to sqrt(l), beside a single one. The probability is
+    that of the upper one given l, times that of there being two at all, by their BIC. Like the
+    losses it takes what few do for incorrect; it is calibrated as far as both are Gaussian.
+    """
+    from sklearn.mixture import GaussianMixture  # only here: importing it takes a second
+
+    roots = np.sort(np.sqrt(np.maximum(losses, 0)))[:, None]
+    if np.ptp(roots) < NO_SPREAD:
+        return np.zeros(len(losses))
+    one, two = (
+        GaussianMixture(
+            count,
+            covariance_type="tied",
+            means_init=-_kmeans_means(-roots.ravel(), count),
+            reg_covar=LEAST_ROOT_VARIANCE,
+            random_state=0,
+        ).fit(roots)
+        for count in (1, 2)
+    )
+    upper = int(two.means_.argmax())
+    shares = two.predict_proba(np.sqrt(np.maximum(losses, 0))[:, None])[:, upper]
+    return np.asarray(shares * expit((one.bic(roots) - two.bic(roots)) / 2))
 
 
 def _assign(
@@ -101,9 +200,33 @@ def _assign(
     return np.count_nonzero(below, axis=1).astype(np.int64)
 
 
-def _within(weights: NDArray[np.float64], groups: NDArray[np.int64]) -> float:
-    parts = [weights[groups == group] for group in np.unique(groups)]
-    return float(sum(((part - part.mean()) ** 2).sum() for part in parts))
+def _best_cuts(
+    values: NDArray[np.float64], counts: NDArray[np.float64], groups: int
+) -> tuple[int, ...]:
+    """Return where to cut the falling distinct `values` for the least sum of squares within."""
+    centred = values - np.average(values, weights=counts)
+    number, first, second = (
+        np.concatenate([[0.0], np.cumsum(counts * centred**power)]) for power in range(3)
+    )
+
+    def within(start: NDArray[np.int64] | int, stop: NDArray[np.int64] | int) -> Any:
+        size = number[stop] - number[start]
+        return second[stop] - second[start] - (first[stop] - first[start]) ** 2 / size
+
+    n = len(values)
+    if groups == 1:
+        return ()
+    if groups == 2:
+        cuts = np.arange(1, n)
+        return (1 + int(np.argmin(within(0, cuts) + within(cuts, n))),)
+    least, best = np.inf, (1, 2)
+    for later in range(2, n):
+        earlier = np.arange(1, later)
+        costs = within(0, earlier) + within(earlier, later)
+        total = costs.min() + within(later, n)
+        if total < least:
+            least, best = total, (1 + int(costs.argmin()), later)
+    return best
 
 
 def _smallest_gap(weights: NDArray[np.float64], grouping: Grouping) -> float:
@@ -113,17 +236,25 @@ def _smallest_gap(weights: NDArray[np.float64], grouping: Grouping) -> float:
 
 def _silhouette(weights: NDArray[np.float64], grouping: Grouping) -> float:
     """Return the mean silhouette; a demonstration alone in its group counts 0, as is the custom."""
-    distances = np.abs(weights[:, None] - weights[None, :])
-    values = np.zeros(len(weights))
-    for index, group in enumerate(grouping.groups):
-        own = grouping.groups == group
-        if own.sum() == 1:
-            continue
-        inner = distances[index, own].sum() / (own.sum() - 1)
-        outer = min(
-            distances[index, grouping.groups == other].mean()
-            for other in range(grouping.count)
-            if other != group
-        )
-        values[index] = (outer - inner) / max(inner, outer, 1e-12)
-    return float(values.mean())
+    sizes = np.bincount(grouping.groups)
+    sums = np.stack(
+        [_distance_sums(weights, weights[grouping.groups == g]) for g in range(len(sizes))], axis=1
+    )
+    everyone, own = np.arange(len(weights)), grouping.groups
+    inner = sums[everyone, own] / np.maximum(sizes[own] - 1, 1)
+    means = sums / sizes
+    means[everyone, own] = np.inf
+    outer = means.min(axis=1)
+    values = (outer - inner) / np.maximum(np.maximum(inner, outer), 1e-12)
+    return float(np.where(sizes[own] == 1, 0.0, values).mean())
+
+
+def _distance_sums(
+    weights: NDArray[np.float64], members: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (D,): sum of the distances of each weight to all members of a group."""
+    members = np.sort(members)
+    below = np.concatenate([[0.0], np.cumsum(members)])
+    place = np.searchsorted(members, weights)
+    left = weights * place - below[place]
+    return np.asarray(left + below[-1] - below[place] - weights * (len(members) - place))

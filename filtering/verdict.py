@@ -6,23 +6,75 @@
 * `equation3`: the paper's conditional next-step model, trimmed, and k-means on its weights.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from filtering.findings import Findings, Places, find_departures, find_surprises
+from filtering.sequence import transitions
 from filtering.thresholds import Grouping, group_weights
 from filtering.weights.norm_score import near_and_far, score_steps
-from filtering.weights.score import Score
-from filtering.weights.steps import Array, StepCounts
+from filtering.weights.precedence import Pairs, precedence_graph
+from filtering.weights.problem import Problem
+from filtering.weights.score import score
+from filtering.weights.solvers import solver_named
+from filtering.weights.steps import Array, StepCounts, StepList, count_steps
 from teasim.errors import ConfigError
+from teasim.pool import Span
 
 SMALLEST_CUT = 2.0
 """Losses up to this are never flagged on their own [nats]."""
 CUT_SHARE = 2 / 3
 """Where between the two clusters' means of sqrt(l) the cut lies."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What is known about the demonstrations of a pool; counts are made when asked for."""
+
+    subtasks: tuple[str, ...]
+    """Names of the T sub-task labels."""
+    segments: tuple[tuple[Span, ...], ...]
+    """Per demonstration its q segments."""
+    states: Sequence[Array]
+    """Per demonstration (q, N): what each segment looks like, rows of mean squared length 1."""
+
+    @cached_property
+    def labels(self) -> list[list[int]]:
+        """Per demonstration the label numbers of its segments, 0..T-1."""
+        numbers = {name: number for number, name in enumerate(self.subtasks)}
+        return [[numbers[span.subtask] for span in spans] for spans in self.segments]
+
+    @cached_property
+    def counts(self) -> StepCounts:
+        """Occurrence, precedence and next steps."""
+        demos = [
+            StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
+            for labels, spans in zip(self.labels, self.segments, strict=True)
+        ]
+        return count_steps(demos, len(self.subtasks))
+
+    @property
+    def places(self) -> Places:
+        """Where the steps are."""
+        return Places(self.segments, self.subtasks)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How the evidence is to be judged; the settings are those of the filter."""
+
+    groups: str
+    threshold: str
+    solver: str
+    trusted_share: float
+    ridge: float
+    precedence: Pairs
+    tolerance: float
 
 
 @dataclass(frozen=True)
@@ -35,25 +87,52 @@ class Verdict:
     """(D,) in [0, 1], 1 for a usual demonstration."""
     grouping: Grouping
     """Groups and threshold on the weights."""
+    trust: Array
+    """(D,) how much each demonstration shapes what is usual, in [0, 1]."""
+    findings: tuple[Findings, ...]
+    """Per demonstration its strange places, the one to name first."""
+    objective: float | None = None
+    """Value of equation 3 [nats per step]; None where it was not asked."""
 
 
-Judge = Callable[[StepCounts, Score, str], Verdict]
+Judge = Callable[[Evidence, Rule], Verdict]
 
 
-def by_norm(counts: StepCounts, surprises: Score, groups: str) -> Verdict:  # noqa: ARG001
+def by_norm(evidence: Evidence, rule: Rule) -> Verdict:
     """Judge by what most of the pool does (the default score)."""
-    losses = score_steps(counts).losses
+    counts = evidence.counts
+    if rule.precedence:
+        counts = counts.restricted(precedence_graph(rule.precedence, evidence.subtasks))
+    found = score_steps(counts, tolerance=rule.tolerance)
+    losses = found.losses
     cut = cut_of(losses)
     weights = 1 / (1 + (losses / cut) ** 2)  # one half at the cut
-    if groups != "auto":
-        return Verdict(losses, weights, group_weights(weights, groups))
     flagged = losses > cut
-    return Verdict(losses, weights, Grouping(flagged.astype(np.int64), 0.5 * flagged.any()))
+    grouping = Grouping(flagged.astype(np.int64), 0.5 * flagged.any())
+    if (rule.groups, rule.threshold) != ("auto", "auto"):
+        grouping = group_weights(weights, rule.groups, _method(rule))
+    findings = find_departures(found, evidence.labels, evidence.places)
+    return Verdict(losses, weights, grouping, found.trust, findings)
 
 
-def by_equation_3(counts: StepCounts, surprises: Score, groups: str) -> Verdict:  # noqa: ARG001
+def by_equation_3(evidence: Evidence, rule: Rule) -> Verdict:
     """Judge by the surprises of equation 3."""
-    return Verdict(surprises.losses, surprises.weights, group_weights(surprises.weights, groups))
+    rows = transitions(evidence.states, evidence.labels, len(evidence.subtasks))
+    problem = Problem(rows, rule.ridge)
+    solved = solver_named(rule.solver).fit(problem, rule.trusted_share * rows.n_demos)
+    found = score(problem, solved)
+    return Verdict(
+        losses=found.losses,
+        weights=found.weights,
+        grouping=group_weights(found.weights, rule.groups, _method(rule)),
+        trust=solved.weights_,
+        findings=find_surprises(rows, found, evidence.labels, evidence.places),
+        objective=solved.objective_,
+    )
+
+
+def _method(rule: Rule) -> str:
+    return "kmeans" if rule.threshold == "auto" else rule.threshold
 
 
 def cut_of(losses: NDArray[np.float64]) -> float:

@@ -1,4 +1,6 @@
-"""Judge real people's annotated sequences by the default score, without reading which are wrong.
+"""Judge real people's annotated sequences by the default score and by baselines.
+
+Which ones are wrong is read for counting only.
 
 FOLDER holds data sets in the MS-TCN form: 50salads (with predictions), captaincook4d and tea_unh,
 the latter two with labels.csv. A data set that is not there is left out.
@@ -7,12 +9,15 @@ the latter two with labels.csv. A data set that is not there is left out.
 import argparse
 import csv
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from filtering.baselines import BASELINES
 from filtering.segmentation.mstcn_folder import MSTCNFolder
+from filtering.thresholds import probability_incorrect
 from filtering.verdict import cut_of
 from filtering.weights.norm_score import score_steps
 from filtering.weights.steps import StepList, count_steps, steps_of_frames
@@ -24,18 +29,37 @@ NO_STEPS = ("action_start", "action_end")
 VISIBLE = ("Missing Step", "Order Error")
 """Errors that a list of steps can show."""
 
+NORM = "norm"
+"""Name of the default score."""
 CRITICAL = ("add_tea_bag", "add_water", "turn_off_oven")
 """What the paper's Seq_3 leaves out."""
 
-Judged = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Losses (D,), flags (D,), truth (D,)."""
+
+@dataclass(frozen=True)
+class Judged:
+    """What was said about a pool of D demonstrations."""
+
+    losses: dict[str, np.ndarray]
+    """(D,) by the default score, NORM, and by every baseline."""
+    flagged: np.ndarray
+    """(D,) flags of the default score."""
+    probabilities: np.ndarray
+    """(D,) how probable it says it is that a demonstration is incorrect."""
+    wrong: np.ndarray
+    """(D,) the truth."""
+
+    @property
+    def areas(self) -> dict[str, float]:
+        """AUROC of every score."""
+        return {name: auroc(losses, self.wrong) for name, losses in self.losses.items()}
 
 
 def judge(demos: Sequence[StepList], wrong: Sequence[bool]) -> Judged:
     """Score one pool."""
     n_subtasks = 1 + max(max(demo.labels) for demo in demos)
     losses = score_steps(count_steps(demos, n_subtasks)).losses
-    return losses, losses > cut_of(losses), np.array(wrong)
+    every = {NORM: losses, **{name: baseline(demos) for name, baseline in BASELINES.items()}}
+    return Judged(every, losses > cut_of(losses), probability_incorrect(losses), np.array(wrong))
 
 
 def salads(root: Path, k: int, pools: int) -> Iterator[Judged]:
@@ -111,6 +135,7 @@ def main() -> int:
     parser.add_argument("--pools", type=int, default=100, help="random pools per row")
     arguments = parser.parse_args()
     root: Path = arguments.folder
+    _print_head()
     if (root / "50salads").is_dir():
         for k in (1, 2, 4, 6):
             _print(f"50-Salads, predicted, 10 + {k}", salads(root / "50salads", k, arguments.pools))
@@ -125,15 +150,24 @@ def main() -> int:
     return 0
 
 
-def _print(name: str, pools: Iterator[Judged] | Sequence[Judged]) -> None:
+def _print_head() -> None:
+    names = "".join(f"{name[:9]:>10}" for name in (NORM, *BASELINES))
+    print(f"{'AUROC of':34}{names}  | {NORM}: accuracy  recall  falsely flagged  Brier")
+
+
+def _print(name: str, pools: Iterable[Judged]) -> None:
     judged = list(pools)
-    area = np.mean([auroc(losses, wrong) for losses, _, wrong in judged])
-    right = np.mean([(flagged == wrong).mean() for _, flagged, wrong in judged])
-    recall = np.mean([flagged[wrong].mean() for _, flagged, wrong in judged])
-    false = np.mean([flagged[~wrong].sum() for _, flagged, wrong in judged])
+    areas = "".join(
+        f"{np.mean([found.areas[score] for found in judged]):10.3f}" for score in (NORM, *BASELINES)
+    )
+    right = np.mean([(found.flagged == found.wrong).mean() for found in judged])
+    recall = np.mean([found.flagged[found.wrong].mean() for found in judged])
+    false = np.mean([found.flagged[~found.wrong].sum() for found in judged])
+    brier = np.mean([((found.probabilities - found.wrong) ** 2).mean() for found in judged])
     print(
-        f"{name:40} AUROC {area:.3f}  accuracy {100 * right:5.1f} %  recall {100 * recall:5.1f} %"
-        f"  falsely flagged {false:.2f}"
+        f"{name:34}{areas}  | {100 * right:12.1f} % {100 * recall:6.1f} % {false:15.2f}"
+        f" {brier:6.3f}",
+        flush=True,
     )
 
 

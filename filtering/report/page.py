@@ -24,7 +24,9 @@ PALETTE = (
     "#3fa7a0",
     "#7d8f3a",
 )
-"""Colours of the sub-tasks in their order; used again from the start when there are more."""
+"""Colours of the first sub-tasks in their order."""
+GOLDEN_ANGLE = 137.508
+"""Further colours are this far apart on the colour wheel [degrees]."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,9 @@ class Segment:
     subtask: str
     """Its name."""
     start: float
-    """Where it starts [s]."""
+    """Where it starts [unit of the page]."""
     stop: float
-    """Where it stops [s]."""
+    """Where it stops [unit of the page]."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +60,15 @@ class DemoView:
     reason: str
     """One sentence, empty for a kept demonstration."""
     seconds: float
-    """Length of the video [s]."""
+    """Length of the video [unit of the page, seconds unless it says otherwise]."""
     segments: tuple[Segment, ...]
     """Its timeline."""
     marks: tuple[Mark, ...] = ()
     """Strange places."""
     video: bytes | None = None
     """The mp4 that is shown, None for none."""
+    name: str = ""
+    """Heading; empty means its number."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,7 @@ def render_report(
     title: str = "Which demonstrations can be trusted?",
     summary: str = "",
     sections: Sequence[ReportSection] = (),
+    unit: str = "s",
 ) -> None:
     """Write the page to `path`, atomically.
 
@@ -97,12 +102,11 @@ def render_report(
         title: heading of the page.
         summary: a line under the heading; empty means the number of flagged videos.
         sections: what other packages add.
+        unit: what times are counted in, s or frames.
 
     Raises:
         TeasimError: the file cannot be written.
     """
-    names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
-    colours = {name: PALETTE[number % len(PALETTE)] for number, name in enumerate(names)}
     ordered = sorted(demos, key=lambda demo: (demo.weight, demo.episode_index))
     longest = max((demo.seconds for demo in demos), default=1.0) or 1.0
     page = (
@@ -113,10 +117,12 @@ def render_report(
             summary=summary or _count_flagged(demos),
             demos=ordered,
             threshold=threshold,
-            colours=colours,
+            colours=_colours(demos, subtasks),
             longest=longest,
             dots=_dots(ordered),
             sections=sections,
+            unit=unit,
+            with_videos=any(demo.video for demo in demos),
             place_marks=lambda marks: place_marks(marks, longest),
         )
     )
@@ -138,6 +144,17 @@ def _environment() -> Environment:
     environment.filters["data_url"] = _data_url
     environment.filters["trusted"] = lambda html: Markup(html)
     return environment
+
+
+def _colours(demos: Sequence[DemoView], subtasks: Sequence[str]) -> dict[str, str]:
+    names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
+    return {name: _colour(number) for number, name in enumerate(names)}
+
+
+def _colour(number: int) -> str:
+    if number < len(PALETTE):
+        return PALETTE[number]
+    return f"hsl({GOLDEN_ANGLE * number % 360:.0f} 38% {(44, 56)[number % 2]}%)"
 
 
 def _spoken(text: str) -> str:

@@ -7,54 +7,63 @@ from pathlib import Path
 import numpy as np
 
 from filtering.demo_filter import DemoFilter
-from filtering.explain import Finding, gravest
+from filtering.explain import Clock, Finding, gravest
 from filtering.report.layout import Mark
 from filtering.report.page import DemoView, Segment
-from teasim.pool import Episode, Pool, VideoClip, read_frames
+from filtering.segmentation.sequence_pool import SequencePool, Source
+from teasim.pool import VideoClip, read_frames
 from teasim.pool.videos import VideoWriter, video_content
 
 
-def demo_views(pool: Pool, fitted: DemoFilter) -> list[DemoView]:
+def demo_views(pool: Source, fitted: DemoFilter) -> list[DemoView]:
     """Return one view per demonstration, in the order of the pool.
 
     Raises:
         PoolError: a video is missing or damaged.
     """
-    camera = fitted.cameras_[0]
-    return [_view(pool, fitted, row, episode, camera) for row, episode in enumerate(pool.episodes)]
+    return [_view(pool, fitted, row) for row in range(len(pool.episodes))]
 
 
-def _view(pool: Pool, fitted: DemoFilter, row: int, episode: Episode, camera: str) -> DemoView:
-    fps = pool.fps
+def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
+    clock = Clock(pool.fps)
     spans = fitted.segments_.spans[row]
     flagged = bool(fitted.flagged_[row])
+    if isinstance(pool, SequencePool):
+        name, length, video = pool.episodes[row].demo_id, spans[-1].stop, None
+    else:
+        episode = pool.episodes[row]
+        name, length = f"Video {episode.index}", episode.length
+        video = _mp4_of(episode.video(fitted.cameras_[0]), pool.fps)
     return DemoView(
-        episode_index=episode.index,
-        demo_id=episode.demo_id,
+        episode_index=pool.episodes[row].index,
+        name=name,
+        demo_id=pool.episodes[row].demo_id,
         weight=float(fitted.weights_[row]),
         loss=float(fitted.losses_[row]),
         flagged=flagged,
         group=int(fitted.groups_[row]),
         reason=fitted.reasons_[row],
-        seconds=episode.length / fps,
-        segments=tuple(Segment(s.subtask, s.start / fps, s.stop / fps) for s in spans),
-        marks=_marks(fitted.findings_[row], fps) if flagged else (),
-        video=_mp4_of(episode.video(camera), fps),
+        seconds=clock.time(length),
+        segments=tuple(Segment(s.subtask, clock.time(s.start), clock.time(s.stop)) for s in spans),
+        marks=_marks(fitted.findings_[row], clock) if flagged else (),
+        video=video,
     )
 
 
-def _marks(findings: Sequence[Finding], fps: float) -> tuple[Mark, ...]:
+def _marks(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
     """Mark what is missing and the gravest of the rest; echoes of those would only confuse."""
+    if not findings:
+        return ()
     grave = gravest(findings)
-    return tuple(_mark(item, fps) for item in findings if item.missing or item in grave)
+    return tuple(_mark(item, clock) for item in findings if item.missing or item in grave)
 
 
-def _mark(finding: Finding, fps: float) -> Mark:
+def _mark(finding: Finding, clock: Clock) -> Mark:
     if finding.expected is None:
         text = "the end was expected"
     else:
         text = f"{finding.expected} {'is missing' if finding.missing else 'expected'}"
-    return Mark(finding.frame / fps, text)
+    return Mark(clock.time(finding.frame), text)
 
 
 def _mp4_of(clip: VideoClip, fps: float) -> bytes:

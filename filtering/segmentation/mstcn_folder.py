@@ -5,6 +5,9 @@ groundTruth/VIDEO.txt    one label per frame and line
 features/VIDEO.npy       optional, (D, n) float
 splits/NAME.bundle       optional, one file name of groundTruth per line
 predictions/VIDEO.txt    optional, like groundTruth
+posteriors/VIDEO.npy     optional, (T, n) probability of each label, beside predictions
+
+Of groundTruth, features and predictions one is enough.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,11 +56,12 @@ class MSTCNFolder:
         videos = sorted(
             {file.stem for file in (root / TRUTH).glob("*.txt")}
             | {file.stem for file in (root / FEATURES).glob("*.npy")}
+            | {file.stem for file in (root / PREDICTIONS).glob("*.txt")}
         )
         if not videos:
             raise PoolError(
-                f"The folder '{root}' holds neither {TRUTH}/*.txt nor {FEATURES}/*.npy; "
-                "it needs one of them."
+                f"The folder '{root}' holds neither {TRUTH}/*.txt nor {FEATURES}/*.npy nor "
+                f"{PREDICTIONS}/*.txt; it needs one of them."
             )
         return cls(root, names, tuple(videos))
 
@@ -77,6 +81,26 @@ class MSTCNFolder:
             PoolError: the file is missing or empty, or names a label that the mapping lacks.
         """
         return self._labels(self.root / PREDICTIONS / f"{video}.txt")
+
+    def posteriors(self, video: str) -> NDArray[np.float32] | None:
+        """Return the probability of each label in each frame, (n, T); None without.
+
+        Raises:
+            PoolError: the file is damaged, or its shape is not that of the predictions.
+        """
+        path = self.root / POSTERIORS / f"{video}.npy"
+        if not path.exists():
+            return None
+        stored = _read_array(path)
+        shape = (len(self.names), len(self.predictions(video)))
+        if stored.shape[0] > shape[0] or stored.shape[1] != shape[1]:
+            raise PoolError(
+                f"'{path}' has the shape {stored.shape}; {MAPPING} and {PREDICTIONS}/{video}.txt "
+                f"want {shape}, labels by frames."
+            )
+        # A segmenter may know fewer labels than the data set, the first of them.
+        unknown = shape[0] - stored.shape[0]
+        return np.ascontiguousarray(np.pad(stored.T, ((0, 0), (0, unknown))), dtype=np.float32)
 
     def features(self, video: str) -> NDArray[np.float32]:
         """Return the features of a video, (n, D).
@@ -145,7 +169,7 @@ class MSTCNFolder:
 
 def is_mstcn_folder(path: Path) -> bool:
     """Tell whether `path` looks like such a folder, be it a damaged one."""
-    return any((path / name).exists() for name in (MAPPING, TRUTH))
+    return any((path / name).exists() for name in (MAPPING, TRUTH, PREDICTIONS))
 
 
 def write_predictions(

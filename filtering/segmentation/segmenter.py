@@ -44,7 +44,24 @@ def _logged_spans(episode: Episode) -> tuple[Span, ...]:
     return spans
 
 
-SEGMENTERS: dict[str, Segmenter] = {"truth": truth, "clustering": clustering}
+def predictions(pool: Pool, *, jobs: int = 1) -> Segmentation:
+    """Refuse a pool: stored predictions are those of an MS-TCN folder (`SequencePool`).
+
+    Raises:
+        ConfigError: always.
+    """
+    del jobs  # nothing to compute
+    raise ConfigError(
+        f"The segmenter 'predictions' reads predictions/*.txt of an MS-TCN folder, but "
+        f"'{pool.root}' is a pool; choose another segmenter."
+    )
+
+
+SEGMENTERS: dict[str, Segmenter] = {
+    "truth": truth,
+    "clustering": clustering,
+    "predictions": predictions,
+}
 
 
 def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = ()) -> Segmenter:

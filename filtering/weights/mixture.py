@@ -38,9 +38,14 @@ class Populations:
     """(2, T) probability that a sub-task occurs: in the norm, in the other."""
 
     @property
+    def lacking(self) -> Array:
+        """(T,) how much rarer each sub-task is in the other population [probability]."""
+        return np.asarray(np.maximum(self.occurrence[0] - self.occurrence[1], 0))
+
+    @property
     def lack(self) -> float:
         """How many steps more the other population leaves out, in expectation."""
-        return float(np.maximum(self.occurrence[0] - self.occurrence[1], 0).sum())
+        return float(self.lacking.sum())
 
 
 def find_populations(counts: StepCounts, seed: int = 0) -> Populations:

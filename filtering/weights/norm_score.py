@@ -18,9 +18,10 @@ The sums run over the other demonstrations, weighted by how much each is trusted
 that are near to that half.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit
 
@@ -51,40 +52,63 @@ class NormScore:
     """(D, T) what each left-out sub-task adds [nats]."""
     misplaced: Array
     """(D, T, T) v_dab: strength of the norm that a comes before b, where it is violated [nats]."""
+    precedence: Array
+    """(D,) PR_d: what all violated pairs add [nats]."""
     transition: Array
-    """(D,) the worst transition [nats]."""
+    """(D,) AD_d: the worst transition [nats]; it counts TRANSITION times."""
+    worst_step: NDArray[np.int64]
+    """(D, 3) the worst transition: from, to, and where most go; T is START, or END."""
+    systematic: Array
+    """(D,) what it adds to be of the other population [nats]."""
+    lack: Array
+    """(T,) how much rarer each sub-task is in the other population [probability]."""
 
 
-def score_steps(counts: StepCounts, seed: int = 0) -> NormScore:
-    """Score the demonstrations of a pool; `seed` draws the starts of the mixture."""
+def score_steps(counts: StepCounts, seed: int = 0, tolerance: float = 0.0) -> NormScore:
+    """Score the demonstrations of a pool.
+
+    Args:
+        counts: what they do.
+        seed: draws the starts of the mixture.
+        tolerance: b in [0, 1): w becomes (1 - b) w + b, so that what a minority does is less of a
+            surprise; about 0.2 spares legal orders that a few share.
+    """
     populations = find_populations(counts, seed)
     first = _score(counts, populations.norm)
     trimmed = _trim(first.losses)
     second = _score(counts, trimmed)
-    trust = _refit(second.losses, trimmed)
+    trust = (1 - tolerance) * _refit(second.losses, trimmed) + tolerance
     final = _score(counts, trust)
     systematic = np.clip(populations.lack - 1, 0, 1) * np.clip(
         populations.log_ratio, 0, LARGEST_RATIO
     )
-    return NormScore(
-        final.losses + SYSTEMATIC * systematic,
-        trust,
-        final.omitted,
-        final.misplaced,
-        final.transition,
+    return replace(
+        final,
+        losses=final.losses + SYSTEMATIC * systematic,
+        systematic=SYSTEMATIC * systematic,
+        lack=populations.lacking,
     )
 
 
 def _score(counts: StepCounts, trust: Array) -> NormScore:
     omitted = (1 - counts.occurs) * np.maximum(_log_odds(counts.occurs, 1.0, trust), 0)
-    order = np.maximum(_log_odds(counts.before, counts.both, trust), 0)
+    order = np.maximum(_log_odds(counts.before, counts.both, trust), 0) * counts.binding
     misplaced = order * (1 - counts.before) * counts.both
     broken = misplaced.reshape(counts.n_demos, -1)
     worst = broken.max(axis=1, initial=0.0)
     precedence = PRECEDENCE_NORM * np.linalg.norm(broken, axis=1) + PRECEDENCE_WORST * worst
-    transition = _worst_transition(counts.follows, trust)
-    losses = omitted.sum(axis=1) + precedence + TRANSITION * transition
-    return NormScore(losses, trust, omitted, misplaced, transition)
+    transition, worst_step = _worst_transition(counts.follows, trust)
+    return NormScore(
+        losses=omitted.sum(axis=1) + precedence + TRANSITION * transition,
+        trust=trust,
+        omitted=omitted,
+        misplaced=misplaced,
+        precedence=precedence,
+        transition=transition,
+        worst_step=worst_step,
+        systematic=np.zeros(counts.n_demos),
+        lack=np.zeros(counts.n_subtasks),
+    )
 
 
 def _log_odds(share: Array, known: Array | float, trust: Array) -> Array:
@@ -96,11 +120,17 @@ def _log_odds(share: Array, known: Array | float, trust: Array) -> Array:
     )
 
 
-def _worst_transition(follows: Array, trust: Array) -> Array:
+def _worst_transition(follows: Array, trust: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return (D,) its excess, (D, 3) from, to, and where most others go."""
     weighted = trust[:, None, None] * follows
     others = weighted.sum(axis=0) - weighted + SMOOTHING
     excess = np.log(others.max(axis=2, keepdims=True) / others)
-    return np.asarray(np.where(follows > 0, excess, 0.0).max(axis=(1, 2)))
+    flat = np.where(follows > 0, excess, 0.0).reshape(len(follows), -1)
+    worst = flat.argmax(axis=1)
+    everyone = np.arange(len(follows))
+    source, target = np.divmod(worst, follows.shape[2])
+    usual = others[everyone, source].argmax(axis=1)
+    return flat[everyone, worst], np.stack([source, target, usual], axis=1)
 
 
 def _trim(losses: Array) -> Array:

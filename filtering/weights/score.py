@@ -27,9 +27,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import log_softmax
 
 from filtering.weights.problem import Multipliers, Problem
-from filtering.weights.solvers import Solution
+from filtering.weights.solver import Solver, kinds_of, thinned
 
 DECAY = 0.5
 """Share that each further surprise of a demonstration counts of the one before it."""
@@ -37,6 +39,10 @@ SMALLEST_UNIT = 1.0
 """Loss above the median that takes a weight from 1 to 1/e in a pool without variety [nats]."""
 SPREADS_PER_UNIT = 2.0
 """The same in a pool with variety [mean distance of the better half below the median]."""
+MOST_REFITS = 200
+"""With more different demonstrations than this, leaving one out is one Newton step."""
+MOST_FOR_CURVATURE = 1000
+"""The curvature for that step is taken from at most so many demonstrations, evenly spread."""
 SMOOTHING = 0.5
 """Pseudo-count on both sides of the omission log-odds [demonstrations]."""
 
@@ -60,10 +66,10 @@ class Score:
         return graded(self.losses)
 
 
-def score(problem: Problem, solution: Solution) -> Score:
-    """Return the leave-one-out score, reweighted once."""
-    first = _score_once(problem, solution.weights, solution.multipliers)
-    multipliers = problem.solve(first.weights, solution.multipliers)
+def score(problem: Problem, solved: Solver) -> Score:
+    """Return the leave-one-out score, reweighted once; `solved` was fitted to the problem."""
+    first = _score_once(problem, solved.weights_, solved.multipliers_)
+    multipliers = problem.solve(first.weights, solved.multipliers_)
     return _score_once(problem, first.weights, multipliers)
 
 
@@ -71,10 +77,9 @@ def _score_once(problem: Problem, weights: NDArray[np.float64], multipliers: Mul
     log_p = leave_one_out(problem, weights, multipliers)
     step = log_p.max(axis=1) - log_p[np.arange(len(log_p)), problem.rows.nexts]
     omission = omission_surprises(problem, weights)
-    demos = problem.rows.demos
     losses = [
-        worst_first(step[demos == demo]) + worst_first(omission[demo])
-        for demo in range(problem.rows.n_demos)
+        worst_first(mine) + worst_first(omission[demo])
+        for demo, mine in enumerate(np.split(step, np.cumsum(problem.steps_per_demo())[:-1]))
     ]
     return Score(step, log_p, omission, np.array(losses))
 
@@ -92,12 +97,44 @@ def leave_one_out(
     Returns:
         (R, T + 1) natural logarithms.
     """
+    kinds, firsts = kinds_of(problem)
+    if len(firsts) > MOST_REFITS:
+        return _one_step(problem, weights, multipliers)
     rows = problem.rows
     log_p = np.zeros((len(rows.demos), rows.n_subtasks + 1))
-    for demo in range(rows.n_demos):
-        others = _without(weights, demo)
-        mine = rows.demos == demo
-        log_p[mine] = problem.log_probabilities(problem.solve(others, multipliers))[mine]
+    for kind, demo in enumerate(firsts.tolist()):
+        refitted = problem.solve(_without(weights, demo), multipliers)
+        mine = kinds[rows.demos] == kind
+        log_p[mine] = log_softmax(rows.states[mine] @ refitted, axis=1)
+    return log_p
+
+
+def _one_step(
+    problem: Problem, weights: NDArray[np.float64], multipliers: Multipliers
+) -> NDArray[np.float64]:
+    """Return the same after one Newton step per demonstration, from the model of all.
+
+    In a large pool one demonstration less moves lambda little. Where the gradient over all
+    vanishes, that over the others is -(w_d / (W - w_d)) (grad l_d + ridge lambda), W = sum w, and
+    their curvature is nearly that of all.
+    """
+    rows = problem.rows
+    some = thinned(rows.n_demos, MOST_FOR_CURVATURE)
+    factor = cho_factor(problem.only(some).curvature(multipliers, weights[some]))
+    log_p = problem.log_probabilities(multipliers)
+    residuals = np.exp(log_p)
+    residuals[np.arange(len(residuals)), rows.nexts] -= 1.0
+    stops = np.cumsum(problem.steps_per_demo())
+    for demos in np.array_split(np.arange(rows.n_demos), 1 + rows.n_demos // 500):
+        mine = [slice(stops[d - 1] if d else 0, stops[d]) for d in demos.tolist()]
+        slopes = problem.ridge * multipliers + np.stack(
+            [rows.states[m].T @ residuals[m] / (m.stop - m.start) for m in mine]
+        )
+        steps = cho_solve(factor, slopes.reshape(len(demos), -1).T).T.reshape(slopes.shape)
+        steps *= (weights[demos] / (weights.sum() - weights[demos]))[:, None, None]
+        for rows_of_one, step in zip(mine, steps, strict=True):
+            scores = rows.states[rows_of_one] @ (multipliers + step)
+            log_p[rows_of_one] = log_softmax(scores, axis=1)
     return log_p
 
 

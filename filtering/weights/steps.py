@@ -57,6 +57,8 @@ class StepCounts:
     """(D, T, T) 1 where the demonstration has a and b, and a is not b."""
     follows: Array
     """(D, T + 1, T + 1) B_dst: how often t comes right after s."""
+    binding: Array
+    """(T, T) 1 where a before b may be asked for, 0 where nobody minds."""
 
     @property
     def n_demos(self) -> int:
@@ -67,6 +69,17 @@ class StepCounts:
     def n_subtasks(self) -> int:
         """T."""
         return self.occurs.shape[1]
+
+    def restricted(self, graph: Array) -> "StepCounts":
+        """Return the same where only `graph` (T, T), 1 for a before b, is known of order."""
+        related = np.maximum(graph, graph.T)
+        return StepCounts(
+            self.occurs,
+            self.before * related,
+            self.both * related,
+            np.zeros_like(self.follows),
+            graph,
+        )
 
 
 def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
@@ -85,7 +98,7 @@ def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
         path = [n_subtasks, *demo.labels, n_subtasks]
         np.add.at(follows[d], (path[:-1], path[1:]), 1.0)
     both = occurs[:, :, None] * occurs[:, None, :] * (1 - np.eye(n_subtasks))
-    return StepCounts(occurs, before * both, both, follows)
+    return StepCounts(occurs, before * both, both, follows, np.ones(shape[1:]))
 
 
 def _precedence(demo: StepList, n_subtasks: int) -> Array:

@@ -41,12 +41,18 @@ def test_too_many_flagged_is_exit_code_1(
         (["--max-flagged", "2"], "--max-flagged is 2.0; choose a share from 0 to 1."),
         (
             ["--segmenter", "luck"],
-            "Unknown segmenter 'luck'; choose truth, clustering or the folder of one that "
-            "`teasim segment fit` made.",
+            "Unknown segmenter 'luck'; choose truth, clustering, predictions or the folder of one "
+            "that `teasim segment fit` made.",
         ),
         (
             ["--segmenter", "clustering", "--subtasks", "few"],
             "subtasks is 'few'; choose auto or a number from 1.",
+        ),
+        (["--fps", "5"], "The pool '{pool}' has its own frame rate; leave out fps."),
+        (
+            ["--segmenter", "predictions"],
+            "The segmenter 'predictions' reads predictions/*.txt of an MS-TCN folder, but '{pool}' "
+            "is a pool; choose another segmenter.",
         ),
         (["--camera", "roof"], "The pool has no camera 'roof'; choose from left, cup."),
         (["--jobs", "-1"], "jobs is -1; choose 1 or more."),
@@ -60,7 +66,7 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main([str(toy_pool.root), "-o", str(tmp_path / "out"), *extra]) == 2
-    assert capsys.readouterr().err == f"teasim: {message}\n"
+    assert capsys.readouterr().err == f"teasim: {message.format(pool=toy_pool.root)}\n"
     assert not (tmp_path / "out").exists()
 
 

@@ -26,9 +26,9 @@ def test_incorrect_demonstrations_are_flagged_with_the_right_reason(
     assert [bool(reason) for reason in toy_filter.reasons_] == WRONG
 
 
-def test_weights_lie_in_0_1_and_trust_sums_to_half_of_the_pool(toy_filter: DemoFilter) -> None:
-    assert ((toy_filter.weights_ >= 0) & (toy_filter.weights_ <= 1)).all()
-    assert toy_filter.trust_.sum() == pytest.approx(len(WRONG) / 2, abs=1e-6)
+def test_weights_and_trust_are_shares(toy_filter: DemoFilter) -> None:
+    for shares in (toy_filter.weights_, toy_filter.trust_):
+        assert ((shares >= 0) & (shares <= 1)).all()
     assert (toy_filter.groups_ == 0).tolist() == [not wrong for wrong in WRONG]
 
 
@@ -67,11 +67,14 @@ def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
     [
         (
             {"segmenter": "luck"},
-            "Unknown segmenter 'luck'; choose truth, clustering or the folder of one that "
-            "`teasim segment fit` made.",
+            "Unknown segmenter 'luck'; choose truth, clustering, predictions or the folder of one "
+            "that `teasim segment fit` made.",
         ),
         ({"score": "luck"}, "Unknown score 'luck'; choose norm, equation3."),
-        ({"solver": "exact"}, "Unknown solver 'exact'; choose annealed."),
+        (
+            {"solver": "magic"},
+            "Unknown solver 'magic'; choose annealed, alternating, exact, published.",
+        ),
         ({"groups": "7"}, "Unknown number of groups '7'; choose auto, 1, 2, 3."),
         (
             {"background": "flow"},
@@ -136,6 +139,15 @@ def test_every_score_finds_the_same_in_an_easy_pool(name: str, toy_pool: Pool) -
     assert found.flagged_.tolist() == WRONG
     assert (found.weights_ < found.threshold_).tolist() == WRONG
     assert found.losses_[~found.flagged_].max() < found.losses_[found.flagged_].min()
+
+
+def test_equation_3_trusts_half_of_the_pool_and_says_its_value(toy_pool: Pool) -> None:
+    found = DemoFilter(FilterConfig(score="equation3")).fit(toy_pool)
+    assert found.trust_.sum() == pytest.approx(len(WRONG) / 2, abs=1e-6)
+    assert found.objective_ is not None
+    assert found.objective_ > 0
+    assert [bool(reason) for reason in found.reasons_] == WRONG
+    assert "'turn_off_oven' is missing" in found.reasons_[5]
 
 
 @pytest.mark.parametrize("name", JUDGES)

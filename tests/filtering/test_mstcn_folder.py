@@ -52,7 +52,20 @@ def test_what_is_written_reads_back(tmp_path):
     assert opened.predictions("b").tolist() == [1]
     pair = opened.pair("a")
     assert (pair.truth.tolist(), pair.predicted.tolist()) == ([0, 1, 1], [0, 1, -1])
-    assert np.load(tmp_path / "posteriors" / "a.npy", allow_pickle=False).shape == (2, 3)
+    read = opened.posteriors("a")
+    assert read is not None
+    np.testing.assert_array_equal(read, posteriors["a"])
+    assert opened.posteriors("b") is None
+    np.save(tmp_path / "posteriors" / "b.npy", np.ones((2, 3)))
+    assert refusal(lambda: opened.posteriors("b")) == (
+        f"'{tmp_path / 'posteriors' / 'b.npy'}' has the shape (2, 3); mapping.txt and "
+        "predictions/b.txt want (2, 1), labels by frames."
+    )
+
+
+def test_predictions_alone_are_enough(tmp_path):
+    write_predictions(tmp_path, ("pour", "stir"), {"a": np.array([0, 1])}, {}, {})
+    assert MSTCNFolder.open(tmp_path).videos == ("a",)
 
 
 def test_a_folder_without_a_mapping(folder):
@@ -83,8 +96,8 @@ def test_an_empty_mapping(folder):
 def test_a_folder_without_videos(tmp_path):
     (tmp_path / "mapping.txt").write_text("0 pour\n")
     assert refusal(lambda: MSTCNFolder.open(tmp_path)) == (
-        f"The folder '{tmp_path}' holds neither groundTruth/*.txt nor features/*.npy; "
-        "it needs one of them."
+        f"The folder '{tmp_path}' holds neither groundTruth/*.txt nor features/*.npy nor "
+        "predictions/*.txt; it needs one of them."
     )
 
 

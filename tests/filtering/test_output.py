@@ -37,9 +37,10 @@ def test_run_record_holds_what_repeats_the_run(
     record = json.loads((written / "filter.json").read_text())
     assert record["pool_hash"] == toy_pool.content_hash()
     assert record["config"]["solver"] == "annealed"
-    assert record["trusted"] == 3.5
+    assert record["trusted"] == pytest.approx(toy_filter.trust_.sum())
+    assert record["objective"] is None
     assert record["threshold"] == toy_filter.threshold_
-    assert sum(record["trust"].values()) == pytest.approx(3.5)
+    assert list(record["trust"].values()) == toy_filter.trust_.tolist()
     assert set(record["seconds"]) == {"segments", "features", "weights"}
 
 

@@ -5,9 +5,9 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from filtering.features.reduction import reduce_features
 from filtering.sequence import transitions
 from filtering.thresholds import group_weights
+from filtering.weights.annealed import Annealed
 from filtering.weights.problem import Problem
 from filtering.weights.score import Score, graded, score, worst_first
-from filtering.weights.solvers import annealed
 from tests.filtering.simulator import SEQ_1, SimulatedPool, pool_of, simulate
 
 
@@ -15,7 +15,7 @@ def score_of(pool: SimulatedPool) -> Score:
     rows = transitions(reduce_features(pool.features), pool.labels, pool.n_subtasks)
     problem = Problem(rows, ridge=0.01)
     with threadpool_limits(limits=1, user_api="blas"):
-        return score(problem, annealed(problem, len(pool.labels) / 2))
+        return score(problem, Annealed().fit(problem, len(pool.labels) / 2))
 
 
 @pytest.mark.parametrize("noise", [0.5, 2.0])

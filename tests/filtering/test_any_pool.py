@@ -1,0 +1,65 @@
+"""The filter works on any pool of step lists: whatever is done, however often, by however many."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from filtering.thresholds import probability_incorrect
+from filtering.verdict import JUDGES, Evidence, Rule
+from filtering.weights.norm_score import score_steps
+from filtering.weights.steps import StepList, count_steps
+from teasim.pool import Span
+
+RULE = Rule("auto", "auto", "annealed", 0.5, 0.01, (), 0.0)
+ORDERS = st.lists(st.lists(st.integers(0, 5), min_size=1, max_size=8), min_size=3, max_size=8)
+"""Repeated sub-tasks, demonstrations of one segment, sub-tasks that nobody does."""
+
+
+def evidence(orders: list[list[int]], n_subtasks: int = 6) -> Evidence:
+    names = tuple(f"step_{k}" for k in range(n_subtasks))
+    spans = tuple(
+        tuple(Span(names[label], 7 * n, 7 * n + 5) for n, label in enumerate(order))
+        for order in orders
+    )
+    return Evidence(names, spans, [np.eye(n_subtasks)[order] for order in orders])
+
+
+@pytest.mark.parametrize("name", JUDGES)
+@given(orders=ORDERS, seed=st.integers(0, 9))
+@settings(max_examples=3, deadline=None)
+def test_every_score_judges_every_pool(name: str, orders: list[list[int]], seed: int) -> None:
+    verdict = JUDGES[name](evidence(orders), RULE)
+    for values in (verdict.losses, verdict.weights, verdict.trust):
+        assert values.shape == (len(orders),)
+        assert np.isfinite(values).all()
+    assert ((verdict.weights >= 0) & (verdict.weights <= 1)).all()
+    assert np.isfinite(probability_incorrect(verdict.losses)).all()
+    flagged = verdict.grouping.flagged
+    assert (verdict.weights[flagged] < verdict.grouping.threshold + 1e-12).all()
+    for demo in np.flatnonzero(flagged):
+        assert all(np.isfinite(item.surprise) for item in verdict.findings[demo])
+    order = np.random.default_rng(seed).permutation(len(orders))
+    permuted = JUDGES[name](evidence([orders[k] for k in order]), RULE)
+    assert permuted.losses == pytest.approx(verdict.losses[order], abs=1e-4)
+
+
+@pytest.mark.parametrize("name", JUDGES)
+@pytest.mark.parametrize("n_subtasks", [1, 2, 30])
+def test_other_numbers_of_sub_tasks(name: str, n_subtasks: int) -> None:
+    full = list(range(n_subtasks))
+    verdict = JUDGES[name](evidence([full] * 5, n_subtasks), RULE)
+    assert not verdict.grouping.flagged.any()
+    if n_subtasks > 1:
+        verdict = JUDGES[name](evidence([full] * 6 + [full[:-1]], n_subtasks), RULE)
+        assert np.flatnonzero(verdict.grouping.flagged).tolist() == [6]
+
+
+def test_ten_thousand_demonstrations_are_scored() -> None:
+    usual, short = (0, 1, 2, 3, 4, 5, 6), (0, 1, 2, 4, 5, 6)
+    demos = [
+        StepList(order, (10,) * len(order))
+        for order in (short if k % 10 == 0 else usual for k in range(10_000))
+    ]
+    losses = score_steps(count_steps(demos, 7)).losses
+    assert losses[::10].min() > 2 > losses[1::10].max()
