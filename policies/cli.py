@@ -25,7 +25,8 @@ class TrainOptions:
     output: Output
     """New folder for the policy."""
     learner: str = "bc"
-    """Learner: bc."""
+    """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (against wrong
+    demonstrations)."""
     level: str = "subtask"
     """What is chosen: subtask."""
     weights: Path | None = None
@@ -34,7 +35,10 @@ class TrainOptions:
     """How weights are used: discard (drop flagged demonstrations), weight, ignore; default: discard
     when there is a weight table."""
     observe: str = "auto"
-    """What the policy sees: pixels, pixels_agent_pos, or auto (joints where the pool logs them)."""
+    """What the policy sees: pixels, pixels_agent_pos, auto (joints where the pool logs them), or
+    state (joints and environment state, no pictures: fast)."""
+    expert: tuple[int, ...] = ()
+    """Episodes known to be good, for demodice; default: the quarter with the largest weights."""
     seed: int = 0
     """Seed of the learner."""
     jobs: int = default_jobs()
@@ -94,7 +98,13 @@ def train(argv: Sequence[str]) -> int:
 
     use = options.use or ("ignore" if options.weights is None else "discard")
     config = TrainConfig(
-        options.learner, options.level, options.weights, use, options.observe, options.seed
+        options.learner,
+        options.level,
+        options.weights,
+        use,
+        options.observe,
+        options.expert,
+        options.seed,
     )
     print(train_policy(options.pool, options.output, config, jobs=options.jobs))
     return 0
