@@ -93,8 +93,11 @@ class DecisionSamples:
 def pictures(observation: Observation, cameras: tuple[str, ...]) -> dict[str, NDArray[np.uint8]]:
     """Return the frame or batch of frames of each of `cameras`.
 
-    With one camera `pixels` is that camera's picture, with several a picture per name.
+    With one camera `pixels` is that camera's picture, with several a picture per name; for
+    stable-baselines3 (sb3.py) the pictures of several cameras have keys of their own.
     """
+    if "pixels" not in observation:
+        return {camera: np.asarray(observation[f"pixels_{camera}"]) for camera in cameras}
     pixels = observation["pixels"]
     if isinstance(pixels, Mapping):
         return {camera: np.asarray(pixels[camera]) for camera in cameras}

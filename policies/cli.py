@@ -4,7 +4,7 @@ Nothing heavy is imported before a verb's options were understood.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -57,6 +57,8 @@ class EvaluateOptions:
     """Seed of the first episode."""
     min_policy_accuracy: float | None = None
     """Least policy accuracy [%] (strict, deterministic decisions); below it the exit code is 1."""
+    against: Path | None = None
+    """Folder of another policy to compare with on the same episodes."""
     json: Path | None = None
     """File for all scores and episodes."""
     junit: Path | None = None
@@ -114,6 +116,7 @@ def evaluate(argv: Sequence[str]) -> int:
     """Run a trained policy in the environment and score it."""
     options = tyro.cli(EvaluateOptions, args=list(argv), prog="teasim evaluate")
     from policies.checkpoint import load_policy
+    from policies.comparison import compare, comparison_json, comparison_text
     from policies.evaluation import EvaluationConfig
     from policies.evaluation import evaluate as try_policy
     from policies.outputs import check_file
@@ -127,13 +130,20 @@ def evaluate(argv: Sequence[str]) -> int:
         options.env_id, quality=options.quality, max_actions=options.max_actions
     )
     config = EvaluationConfig(options.episodes, options.seed, world, options.video)
-    scores = try_policy(load_policy(options.run), config, jobs=options.jobs)
+    policy = load_policy(options.run)
+    other = None if options.against is None else load_policy(options.against)
+    scores = try_policy(policy, config, jobs=options.jobs)
+    about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
+    print(summary(scores))
+    if other is not None:
+        rival = try_policy(other, replace(config, video=None), jobs=options.jobs)
+        found = compare(scores, rival)
+        about |= {"against": str(options.against), "comparison": comparison_json(found)}
+        print(comparison_text(found, str(options.against)))
     if options.json:
-        about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
         write_scores(options.json, scores, about)
     if options.junit:
         write_junit(options.junit, scores, bar)
-    print(summary(scores))
     if bar is None or bar.passed(scores):
         return 0
     print(f"policy accuracy is below {bar.percent:g} %")

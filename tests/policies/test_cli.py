@@ -179,3 +179,15 @@ def test_a_result_file_that_is_a_folder_is_found_before_the_work(run, tmp_path):
 
 def test_the_usual_environment_is_the_tea_station():
     assert ENVIRONMENT == "teasim:teasim/TeaMakingSubtasks-v0"
+
+
+def test_two_policies_are_compared_on_the_same_episodes(run, stirrer, tmp_path, capsys):
+    assert try_out(run, "--against", stirrer, "--json", tmp_path / "s.json") == 0
+    assert f"beside {stirrer} on the same 3 episodes" in capsys.readouterr().out
+    saved = json.loads((tmp_path / "s.json").read_text())
+    assert saved["against"] == str(stirrer)
+    assert saved["comparison"]["deterministic"]["success"] == {
+        "first": 3,
+        "second": 0,
+        "p_value": 0.25,
+    }
