@@ -1,4 +1,4 @@
-"""The verbs of this floor: train, evaluate, demo. Options only; the work is done elsewhere.
+"""The verbs of this floor: train, evaluate, ablate, demo. Options only; the work is done elsewhere.
 
 Nothing heavy is imported before a verb's options were understood.
 """
@@ -93,6 +93,18 @@ class DemoOptions:
     """Processes."""
 
 
+@dataclass(frozen=True)
+class AblateOptions:
+    """Train and score policies over pools x filters x learners x seeds."""
+
+    config: tyro.conf.Positional[Path]
+    """TOML file that says what is varied (policies/experiments/ablation_config.py has one)."""
+    output: Output
+    """Folder for the results; one that holds a part of them is gone on with."""
+    jobs: int = default_jobs()
+    """Processes."""
+
+
 def train(argv: Sequence[str]) -> int:
     """Train a policy on a pool of demonstrations."""
     options = tyro.cli(TrainOptions, args=list(argv), prog="teasim train")
@@ -157,4 +169,15 @@ def demo(argv: Sequence[str]) -> int:
 
     config = DemoConfig(options.seq1, options.seq3, options.episodes, options.seed)
     print(run_demo(options.output, config, jobs=options.jobs))
+    return 0
+
+
+def ablate(argv: Sequence[str]) -> int:
+    """Train and score policies over pools x filters x learners x seeds."""
+    options = tyro.cli(AblateOptions, args=list(argv), prog="teasim ablate")
+    from policies.experiments.ablation import run_ablation
+    from policies.experiments.ablation_config import AblationConfig
+
+    config = AblationConfig.read(options.config)
+    print(run_ablation(config, options.output, jobs=options.jobs))
     return 0

@@ -87,7 +87,7 @@ def expert_settings(kind: LearnerKind, pool: Pool, config: TrainConfig) -> dict[
             )
         return {}
     if config.expert:
-        return {"experts": tuple(_place(pool, episode) for episode in config.expert)}
+        return {"experts": places_of(pool, config.expert)}
     if config.weights is None:
         raise ConfigError(
             f"The learner '{config.learner}' needs demonstrations known to be good; name their "
@@ -96,11 +96,16 @@ def expert_settings(kind: LearnerKind, pool: Pool, config: TrainConfig) -> dict[
     return {"experts": likely_experts(pool, config.weights)}
 
 
-def _place(pool: Pool, episode_index: int) -> int:
+def places_of(pool: Pool, episodes: tuple[int, ...]) -> tuple[int, ...]:
+    """Places in `pool` of the episodes with these indexes.
+
+    Raises:
+        ConfigError: the pool has no such episode.
+    """
     indexes = [episode.index for episode in pool.episodes]
-    if episode_index not in indexes:
+    unknown = [episode for episode in episodes if episode not in indexes]
+    if unknown:
         raise ConfigError(
-            f"'{pool.root}' has no episode {episode_index}; choose from {indexes[0]} to "
-            f"{indexes[-1]}."
+            f"'{pool.root}' has no episode {unknown[0]}; choose from {indexes[0]} to {indexes[-1]}."
         )
-    return indexes.index(episode_index)
+    return tuple(indexes.index(episode) for episode in episodes)
