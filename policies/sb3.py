@@ -11,7 +11,7 @@ that does the same, and then learn from its own attempts:
     policy = load_policy(Path("policy"))          # teasim train POOL --observe state -o policy
     env = sb3_environment(EnvironmentConfig(), policy.spec)
     model = as_ppo(policy, env, n_steps=64, batch_size=64, learning_rate=1e-4)
-    model.learn(2000)                             # about 1.5 s of one core per action
+    model.learn(2000)                             # actions, each a whole sub-task in physics
     model.save("finetuned")
 
 The value network starts untrained: keep the learning rate low, or the first updates, made with
