@@ -64,7 +64,7 @@ class EvaluateOptions:
     junit: Path | None = None
     """File for a build server."""
     video: Path | None = None
-    """Folder for what the policy saw, one frame per decision."""
+    """Folder for what the policy saw, one frame per decision with the choice written below it."""
     env_id: str = "teasim:teasim/TeaMakingSubtasks-v0"
     """Gymnasium id of the environment."""
     quality: str = "fast"
