@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Observation = Mapping[str, Any]
-"""One of `TeaMakingSubtasks-v0`: `pixels` ((H, W, 3) uint8 per camera) and `agent_pos` (J,)."""
+"""One of `TeaMakingSubtasks-v0`: `pixels` ((H, W, 3) uint8 per camera) and `agent_pos` (J,), or
+`agent_pos` and `environment_state` (E,)."""
 
-RecurrentState = tuple[NDArray[np.float32], ...]
+RecurrentState = tuple[NDArray[np.floating[Any]], ...]
 """What a policy with a memory carries from one decision to the next."""
 
 
@@ -19,26 +20,34 @@ class ObservationSpec:
     """What a policy looks at; an environment must offer exactly this."""
 
     cameras: tuple[str, ...]
-    """Cameras in the order of their features."""
+    """Cameras in the order of their features; empty: the policy sees the state alone."""
     height: int
-    """Height of a frame [pixel]."""
+    """Height of a frame [pixel]; 0 without cameras."""
     width: int
-    """Width of a frame [pixel]."""
+    """Width of a frame [pixel]; 0 without cameras."""
     state_names: tuple[str, ...] = ()
     """Names of the joint positions [rad; m for grippers]; empty: the policy sees frames alone."""
+    environment_names: tuple[str, ...] = ()
+    """Names of the environment state (poses [m], amounts [ml or g]); empty: it is not seen."""
+
+    @property
+    def low_dim(self) -> int:
+        """S, how many numbers are seen beside the pictures."""
+        return len(self.state_names) + len(self.environment_names)
 
 
 @dataclass(frozen=True)
 class DecisionSamples:
     """The decisions of a pool: what was seen before each sub-task, and which one was chosen.
 
-    n decisions, each in V views (the frames as they were, then altered copies), K cameras.
+    n decisions, each in V views (the frames as they were, then altered copies), K cameras. Those of
+    one demonstration stand in the order of time.
     """
 
     maps: NDArray[np.float16]
     """Feature maps of what was seen.  # (n, V, K, C, h, w)"""
-    joints: NDArray[np.float32]
-    """Joint positions [rad; m]; J = 0 where the policy sees frames alone.  # (n, J)"""
+    low_dim: NDArray[np.float32]
+    """Joint positions, then environment state; S = 0 where frames alone are seen.  # (n, S)"""
     labels: NDArray[np.int64]
     """Chosen sub-task, an index into `action_names`.  # (n,)"""
     demos: NDArray[np.int64]
@@ -50,16 +59,16 @@ class DecisionSamples:
 
     def __post_init__(self) -> None:
         """Check that the fields belong together and make the arrays read-only."""
-        arrays = (self.maps, self.joints, self.labels, self.demos)
+        arrays = (self.maps, self.low_dim, self.labels, self.demos)
         if len({len(array) for array in arrays}) != 1:
             raise ValueError(f"fields differ in length: {[len(array) for array in arrays]}")
         if self.maps.ndim != 6 or self.maps.shape[2] != len(self.spec.cameras):
             raise ValueError(f"maps have shape {self.maps.shape}, not (n, V, K, C, h, w)")
-        if self.joints.shape[1:] != (len(self.spec.state_names),):
-            raise ValueError(f"joints have shape {self.joints.shape}, not (n, J)")
+        if self.low_dim.shape[1:] != (self.spec.low_dim,):
+            raise ValueError(f"low_dim has shape {self.low_dim.shape}, not (n, S)")
         if len(self.labels) and not 0 <= self.labels.min() <= self.labels.max() < self.n_actions:
             raise ValueError(f"labels must lie in [0, {self.n_actions})")
-        if not (np.isfinite(self.maps).all() and np.isfinite(self.joints).all()):
+        if not (np.isfinite(self.maps).all() and np.isfinite(self.low_dim).all()):
             raise ValueError("an input is not finite")
         for array in arrays:
             array.setflags(write=False)
@@ -73,7 +82,7 @@ class DecisionSamples:
         """Return the decisions at `rows` (indices, repeats allowed, or a mask)."""
         return DecisionSamples(
             self.maps[rows],
-            self.joints[rows],
+            self.low_dim[rows],
             self.labels[rows],
             self.demos[rows],
             self.spec,
@@ -84,8 +93,11 @@ class DecisionSamples:
 def pictures(observation: Observation, cameras: tuple[str, ...]) -> dict[str, NDArray[np.uint8]]:
     """Return the frame or batch of frames of each of `cameras`.
 
-    With one camera `pixels` is that camera's picture, with several a picture per name.
+    With one camera `pixels` is that camera's picture, with several a picture per name; for
+    stable-baselines3 (sb3.py) the pictures of several cameras have keys of their own.
     """
+    if "pixels" not in observation:
+        return {camera: np.asarray(observation[f"pixels_{camera}"]) for camera in cameras}
     pixels = observation["pixels"]
     if isinstance(pixels, Mapping):
         return {camera: np.asarray(pixels[camera]) for camera in cameras}

@@ -3,12 +3,14 @@
 The paper, section 4.3: the policy infers the next sub-task given the current state.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
 from policies.base import DecisionSamples
@@ -36,7 +38,9 @@ class BCConfig:
     def __post_init__(self) -> None:
         """Raise ConfigError for a value that cannot train."""
         if self.steps < 1 or self.learning_rate <= 0 or self.weight_decay < 0:
-            raise ConfigError("bc needs steps >= 1, learning_rate > 0 and weight_decay >= 0.")
+            raise ConfigError(
+                "A learner needs steps >= 1, learning_rate > 0 and weight_decay >= 0."
+            )
         if self.bottleneck < 1:
             raise ConfigError(f"bottleneck is {self.bottleneck}; choose 1 or more.")
 
@@ -62,38 +66,50 @@ class BC:
             ConfigError: the weights do not fit the samples, or all are 0.
         """
         samples, shares = weigh(samples, weights)
-        shape = NetworkShape(
-            cameras=samples.maps.shape[2],
-            channels=samples.maps.shape[3],
-            joints=samples.joints.shape[1],
-            bottleneck=self.config.bottleneck,
-            actions=samples.n_actions,
-        )
-        network = DecisionNetwork(shape, self.config.seed)
+        network = DecisionNetwork(shape_for(samples, self.config.bottleneck), self.config.seed)
         network.standardise(weighted_moments(samples, shares))
-        with one_thread():
-            self.history_ = self._descend(network, samples, shares)
+        self.history_ = clone(network, network, samples, shares, self.config)
         self.policy_ = SubtaskPolicy(network, samples.spec, samples.action_names)
         return self
 
-    def _descend(
-        self, network: DecisionNetwork, samples: DecisionSamples, shares: NDArray[np.float64]
-    ) -> tuple[float, ...]:
-        optimizer = torch.optim.AdamW(
-            network.parameters(),
-            lr=self.config.learning_rate,
-            weight_decay=self.config.weight_decay,
-        )
-        joints = torch.from_numpy(samples.joints.copy())
-        labels = torch.from_numpy(samples.labels.copy())
-        weights = torch.from_numpy(shares)
-        history = []
-        for step in range(self.config.steps):
+
+def shape_for(samples: DecisionSamples, bottleneck: int) -> NetworkShape:
+    """Sizes of a network that looks at `samples`."""
+    return NetworkShape(
+        cameras=samples.maps.shape[2],
+        channels=samples.maps.shape[3],
+        low_dim=samples.low_dim.shape[1],
+        bottleneck=bottleneck,
+        actions=samples.n_actions,
+    )
+
+
+def clone(
+    network: nn.Module,
+    logits_of: Callable[[Tensor, Tensor], Tensor],
+    samples: DecisionSamples,
+    shares: NDArray[np.float64],
+    config: BCConfig,
+) -> tuple[float, ...]:
+    """Descend sum_i shares_i [-log pi(t_i | s_i)] and return its value before every step.
+
+    `logits_of` (maps (n, K, C, h, w), state (n, S)) -> (n, A) asks `network`, whose parameters are
+    changed; `shares` (n,) sum to 1.
+    """
+    optimizer = torch.optim.AdamW(
+        network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
+    )
+    low_dim = torch.from_numpy(samples.low_dim.copy())
+    labels = torch.from_numpy(samples.labels.copy())
+    weights = torch.from_numpy(shares)
+    history = []
+    with one_thread():
+        for step in range(config.steps):
             maps = torch.from_numpy(samples.maps[:, step % samples.maps.shape[1]].copy())
             optimizer.zero_grad()
-            losses = cross_entropy(network(maps, joints), labels, reduction="none")
+            losses = cross_entropy(logits_of(maps, low_dim), labels, reduction="none")
             loss = weighted_loss(losses, weights)
             loss.backward()
             optimizer.step()
             history.append(loss.item())
-        return tuple(history)
+    return tuple(history)

@@ -10,11 +10,14 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
 from policies.base import ObservationSpec
-from policies.networks import DecisionNetwork, NetworkShape
+from policies.networks import DecisionNetwork, Ensemble, NetworkShape, RecurrentNetwork
 from policies.subtask_policy import SubtaskPolicy
 from teasim.pool.checkpoint import CheckpointKind
 
-POLICY = CheckpointKind("policy", 1, held="trained policy", remedy="train again")
+POLICY = CheckpointKind("policy", 2, held="trained policy", remedy="train again")
+
+NETWORKS = {network.kind: network for network in (DecisionNetwork, Ensemble, RecurrentNetwork)}
+"""The networks a policy may have, by the name they are saved under."""
 
 
 def save_policy(policy: SubtaskPolicy, run: Path, *, training: Mapping[str, Any]) -> None:
@@ -22,7 +25,9 @@ def save_policy(policy: SubtaskPolicy, run: Path, *, training: Mapping[str, Any]
     description = {
         "observation": asdict(policy.spec),
         "actions": policy.action_names,
+        "kind": policy.network.kind,
         "network": asdict(policy.network.shape),
+        "settings": dict(policy.network.settings),
         "training": dict(training),
     }
     POLICY.save(run, save_tensors(policy.network.state_dict()), description)
@@ -39,7 +44,9 @@ def load_policy(run: Path) -> SubtaskPolicy:
     try:
         spec = _spec(description["observation"])
         actions = tuple(str(name) for name in description["actions"])
-        network = DecisionNetwork(NetworkShape(**description["network"]), seed=0)
+        make = NETWORKS[description["kind"]]
+        shape = NetworkShape(**description["network"])
+        network = make(shape, seed=0, **description["settings"])
         if network.shape.actions != len(actions):
             raise ValueError("one action per output")
         network.load_state_dict(load_tensors(weights))
@@ -54,4 +61,5 @@ def _spec(fields: Mapping[str, Any]) -> ObservationSpec:
         height=int(fields["height"]),
         width=int(fields["width"]),
         state_names=tuple(fields["state_names"]),
+        environment_names=tuple(fields["environment_names"]),
     )

@@ -1,10 +1,10 @@
-"""The verbs of this floor: train, evaluate, demo. Options only; the work is done elsewhere.
+"""The verbs of this floor: train, evaluate, ablate, demo. Options only; the work is done elsewhere.
 
 Nothing heavy is imported before a verb's options were understood.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -25,7 +25,8 @@ class TrainOptions:
     output: Output
     """New folder for the policy."""
     learner: str = "bc"
-    """Learner: bc."""
+    """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (against wrong
+    demonstrations)."""
     level: str = "subtask"
     """What is chosen: subtask."""
     weights: Path | None = None
@@ -34,7 +35,10 @@ class TrainOptions:
     """How weights are used: discard (drop flagged demonstrations), weight, ignore; default: discard
     when there is a weight table."""
     observe: str = "auto"
-    """What the policy sees: pixels, pixels_agent_pos, or auto (joints where the pool logs them)."""
+    """What the policy sees: pixels, pixels_agent_pos, auto (joints where the pool logs them), or
+    state (joints and environment state, no pictures: fast)."""
+    expert: tuple[int, ...] = ()
+    """Episodes known to be good, for demodice; default: the quarter with the largest weights."""
     seed: int = 0
     """Seed of the learner."""
     jobs: int = default_jobs()
@@ -53,12 +57,14 @@ class EvaluateOptions:
     """Seed of the first episode."""
     min_policy_accuracy: float | None = None
     """Least policy accuracy [%] (strict, deterministic decisions); below it the exit code is 1."""
+    against: Path | None = None
+    """Folder of another policy to compare with on the same episodes."""
     json: Path | None = None
     """File for all scores and episodes."""
     junit: Path | None = None
     """File for a build server."""
     video: Path | None = None
-    """Folder for what the policy saw, one frame per decision."""
+    """Folder for what the policy saw, one frame per decision with the choice written below it."""
     env_id: str = "teasim:teasim/TeaMakingSubtasks-v0"
     """Gymnasium id of the environment."""
     quality: str = "fast"
@@ -87,6 +93,18 @@ class DemoOptions:
     """Processes."""
 
 
+@dataclass(frozen=True)
+class AblateOptions:
+    """Train and score policies over pools x filters x learners x seeds."""
+
+    config: tyro.conf.Positional[Path]
+    """TOML file that says what is varied (policies/experiments/ablation_config.py has one)."""
+    output: Output
+    """Folder for the results; one that holds a part of them is gone on with."""
+    jobs: int = default_jobs()
+    """Processes."""
+
+
 def train(argv: Sequence[str]) -> int:
     """Train a policy on a pool of demonstrations."""
     options = tyro.cli(TrainOptions, args=list(argv), prog="teasim train")
@@ -94,7 +112,13 @@ def train(argv: Sequence[str]) -> int:
 
     use = options.use or ("ignore" if options.weights is None else "discard")
     config = TrainConfig(
-        options.learner, options.level, options.weights, use, options.observe, options.seed
+        options.learner,
+        options.level,
+        options.weights,
+        use,
+        options.observe,
+        options.expert,
+        options.seed,
     )
     print(train_policy(options.pool, options.output, config, jobs=options.jobs))
     return 0
@@ -104,6 +128,7 @@ def evaluate(argv: Sequence[str]) -> int:
     """Run a trained policy in the environment and score it."""
     options = tyro.cli(EvaluateOptions, args=list(argv), prog="teasim evaluate")
     from policies.checkpoint import load_policy
+    from policies.comparison import compare, comparison_json, comparison_text
     from policies.evaluation import EvaluationConfig
     from policies.evaluation import evaluate as try_policy
     from policies.outputs import check_file
@@ -117,13 +142,20 @@ def evaluate(argv: Sequence[str]) -> int:
         options.env_id, quality=options.quality, max_actions=options.max_actions
     )
     config = EvaluationConfig(options.episodes, options.seed, world, options.video)
-    scores = try_policy(load_policy(options.run), config, jobs=options.jobs)
+    policy = load_policy(options.run)
+    other = None if options.against is None else load_policy(options.against)
+    scores = try_policy(policy, config, jobs=options.jobs)
+    about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
+    print(summary(scores))
+    if other is not None:
+        rival = try_policy(other, replace(config, video=None), jobs=options.jobs)
+        found = compare(scores, rival)
+        about |= {"against": str(options.against), "comparison": comparison_json(found)}
+        print(comparison_text(found, str(options.against)))
     if options.json:
-        about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
         write_scores(options.json, scores, about)
     if options.junit:
         write_junit(options.junit, scores, bar)
-    print(summary(scores))
     if bar is None or bar.passed(scores):
         return 0
     print(f"policy accuracy is below {bar.percent:g} %")
@@ -137,4 +169,15 @@ def demo(argv: Sequence[str]) -> int:
 
     config = DemoConfig(options.seq1, options.seq3, options.episodes, options.seed)
     print(run_demo(options.output, config, jobs=options.jobs))
+    return 0
+
+
+def ablate(argv: Sequence[str]) -> int:
+    """Train and score policies over pools x filters x learners x seeds."""
+    options = tyro.cli(AblateOptions, args=list(argv), prog="teasim ablate")
+    from policies.experiments.ablation import run_ablation
+    from policies.experiments.ablation_config import AblationConfig
+
+    config = AblationConfig.read(options.config)
+    print(run_ablation(config, options.output, jobs=options.jobs))
     return 0

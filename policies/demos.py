@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 
 from policies.augmentation import views
 from policies.base import DecisionSamples, ObservationSpec
-from policies.features import Maps, camera_maps
+from policies.features import NO_MAPS, Maps, camera_maps
 from teasim import parallel
 from teasim.errors import ConfigError, PoolError
 from teasim.pool import Episode, Pool, read_frames
 
 STATE_COLUMN = "observation.state"
+ENVIRONMENT_COLUMN = "observation.environment_state"
 
-OBSERVE = ("auto", "pixels", "pixels_agent_pos")
-"""`auto`: joint positions too where the pool logs them, frames alone (human videos) where not."""
+OBSERVE = ("auto", "pixels", "pixels_agent_pos", "state")
+"""`auto`: joint positions too where the pool logs them, frames alone (human videos) where not.
+`state`: joint positions and environment state, no frames; trains and plays without a camera."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class DemosConfig:
     """How a pool is turned into decisions."""
 
     observe: str = "auto"
-    """What a policy will see: `pixels`, `pixels_agent_pos` or `auto`."""
+    """What a policy will see: `auto`, `pixels`, `pixels_agent_pos` or `state`."""
     cameras: tuple[str, ...] = ()
     """Cameras to use; empty: all of the pool."""
     copies: int = 3
@@ -65,9 +67,9 @@ def load_decisions(
     read = partial(_read_demo, subtasks=pool.subtasks, spec=spec, config=config)
     episodes = [pool.episodes[place] for place in acting]
     demos = parallel.run(read, episodes, jobs=jobs, description="decisions")
-    maps, joints, labels = (np.concatenate(parts) for parts in zip(*demos, strict=True))
+    maps, low_dim, labels = (np.concatenate(parts) for parts in zip(*demos, strict=True))
     places = np.repeat(acting, [len(labels) for _, _, labels in demos])
-    return DecisionSamples(maps, joints, labels, places, spec, pool.subtasks)
+    return DecisionSamples(maps, low_dim, labels, places, spec, pool.subtasks)
 
 
 def observation_spec(pool: Pool, config: DemosConfig) -> ObservationSpec:
@@ -81,10 +83,12 @@ def observation_spec(pool: Pool, config: DemosConfig) -> ObservationSpec:
         raise ConfigError(
             f"'{pool.root}' has no camera '{unknown[0]}'; choose {', '.join(pool.cameras)}."
         )
-    if config.observe == "pixels_agent_pos" and not pool.state_names:
+    if config.observe in ("pixels_agent_pos", "state") and not pool.state_names:
         raise ConfigError(
             f"'{pool.root}' logs no joint positions; choose observe auto or pixels instead."
         )
+    if config.observe == "state":
+        return ObservationSpec((), 0, 0, tuple(pool.state_names or ()), _environment_names(pool))
     names = () if config.observe == "pixels" else pool.state_names or ()
     cameras = config.cameras or pool.cameras
     height, width, _ = read_frames(pool.episodes[0].video(cameras[0]), [0])[0].shape
@@ -94,13 +98,21 @@ def observation_spec(pool: Pool, config: DemosConfig) -> ObservationSpec:
 def _read_demo(
     episode: Episode, *, subtasks: tuple[str, ...], spec: ObservationSpec, config: DemosConfig
 ) -> tuple[Maps, NDArray[np.float32], NDArray[np.int64]]:
-    """Read one demonstration: maps (n, V, K, C, h, w), joints (n, J), labels (n,)."""
+    """Read one demonstration: maps (n, V, K, C, h, w), state (n, S), labels (n,)."""
     spans = episode.spans()
     starts = [span.start for span in spans]
     labels = np.array([subtasks.index(span.subtask) for span in spans], dtype=np.int64)
-    joints = np.empty((len(spans), 0), dtype=np.float32)
-    if spec.state_names:
-        joints = episode.column(STATE_COLUMN)[starts].astype(np.float32)
+    columns = [STATE_COLUMN] if spec.state_names else []
+    columns += [ENVIRONMENT_COLUMN] if spec.environment_names else []
+    nothing = np.empty((len(spans), 0))
+    parts = [nothing, *(episode.column(name)[starts] for name in columns)]
+    return _maps(episode, starts, spec, config), np.hstack(parts).astype(np.float32), labels
+
+
+def _maps(episode: Episode, starts: list[int], spec: ObservationSpec, config: DemosConfig) -> Maps:
+    """Feature maps (n, V, K, C, h, w) of the frames at `starts`; K is 0 without cameras."""
+    if not spec.cameras:
+        return np.empty((len(starts), 1, *NO_MAPS), dtype=np.float16)
     random = np.random.default_rng([config.seed, zlib.crc32(episode.demo_id.encode())])
     seen = {
         camera: views(read_frames(episode.video(camera), starts), config.copies, random)
@@ -108,4 +120,17 @@ def _read_demo(
     }
     flat = {camera: frames.reshape(-1, *frames.shape[2:]) for camera, frames in seen.items()}
     maps = camera_maps(flat, spec.cameras)
-    return maps.reshape(len(spans), 1 + config.copies, *maps.shape[1:]), joints, labels
+    return maps.reshape(len(starts), 1 + config.copies, *maps.shape[1:])
+
+
+def _environment_names(pool: Pool) -> tuple[str, ...]:
+    feature = pool.info["features"].get(ENVIRONMENT_COLUMN)
+    if feature is None:
+        raise ConfigError(
+            f"'{pool.root}' logs no environment state; choose observe auto, pixels or "
+            "pixels_agent_pos instead."
+        )
+    (length,) = feature["shape"]
+    names = feature.get("names")
+    # Foreign pools may name nothing; what counts is how many numbers there are.
+    return tuple(map(str, names if isinstance(names, list) else range(length)))

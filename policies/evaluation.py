@@ -20,6 +20,9 @@ from teasim.errors import ConfigError
 
 MODES = ("deterministic", "sampled")
 
+SPILL = "spilled_"
+"""How the violations begin that say something was spilled."""
+
 EPISODES_PER_BATCH = 4
 """Episodes that share one environment: few enough to keep all workers busy until the end."""
 
@@ -59,6 +62,8 @@ class Scores:
     """Share of episodes that reach the goal."""
     unsafe: Rate
     """Share of episodes that end with the oven on."""
+    spills: Rate
+    """Share of episodes in which something was spilled."""
     completion: dict[str, Rate]
     """Per sub-task: share of episodes in which it took effect."""
     violations: dict[str, int]
@@ -99,7 +104,8 @@ def evaluate(policy: Policy, config: EvaluationConfig, *, jobs: int = 1) -> dict
 
 def play(batch: Batch) -> list[Episode]:
     """Play the episodes of `batch` in one environment, made here in the worker."""
-    env = make_environment(batch.environment, batch.policy.spec)
+    filmed = batch.video is not None
+    env = make_environment(batch.environment, batch.policy.spec, filmed=filmed)
     with one_thread(), closing(env):
         return [
             run_episode(
@@ -124,12 +130,17 @@ def score(mode: str, episodes: Sequence[Episode], subtasks: Sequence[str]) -> Sc
         grouped_rate([(sum(a.allowed for a in e.actions), len(e.actions)) for e in episodes]),
         rate(sum(episode.success for episode in episodes), count),
         rate(sum(episode.unsafe for episode in episodes), count),
+        rate(sum(_spilled(episode) for episode in episodes), count),
         {
             name: rate(sum(name in episode.subtasks_done for episode in episodes), count)
             for name in subtasks
         },
         dict(sorted(rules.items())),
     )
+
+
+def _spilled(episode: Episode) -> bool:
+    return any(rule.startswith(SPILL) for rule in episode.violations)
 
 
 def _batches(seeds: Sequence[int]) -> list[tuple[int, ...]]:

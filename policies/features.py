@@ -17,6 +17,9 @@ from policies.networks import one_thread
 Maps = NDArray[np.float16]
 """Feature maps (..., K, C, h, w) of K cameras; half precision, because a pool has many."""
 
+NO_MAPS = (0, 0, 1, 1)
+"""Shape (K, C, h, w) of the maps of no camera."""
+
 
 def camera_maps(pixels: Mapping[str, NDArray[np.uint8]], cameras: tuple[str, ...]) -> Maps:
     """Compute the maps of `cameras`, in that order.

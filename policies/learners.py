@@ -1,7 +1,7 @@
 """The learners by name; a new learner is one line here and one file beside this one."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 
 from policies.base import DecisionSamples
 from policies.bc import BC, BCConfig
+from policies.bc_rnn import BCRNN, BCRNNConfig
+from policies.bcnd import BCND, BCNDConfig
+from policies.demodice import DemoDICE, DemoDICEConfig
+from policies.r_maxent import RMaxEnt, RMaxEntConfig
 from policies.subtask_policy import SubtaskPolicy
 from teasim.errors import ConfigError
 
@@ -36,13 +40,24 @@ class LearnerKind:
     levels: tuple[str, ...]
     """Levels it learns at: `subtask` (which sub-task comes next)."""
 
+    @property
+    def takes_experts(self) -> bool:
+        """Whether it has to be told of demonstrations that are known to be good."""
+        return "experts" in {field.name for field in fields(self.config)}
+
     def make(self, **settings: Any) -> Learner:
         """Build the learner with `settings` of its config."""
         made: Learner = self.learner(self.config(**settings))
         return made
 
 
-LEARNERS = {"bc": LearnerKind(BC, BCConfig, ("subtask",))}
+LEARNERS = {
+    "bc": LearnerKind(BC, BCConfig, ("subtask",)),
+    "bc-rnn": LearnerKind(BCRNN, BCRNNConfig, ("subtask",)),
+    "bcnd": LearnerKind(BCND, BCNDConfig, ("subtask",)),
+    "demodice": LearnerKind(DemoDICE, DemoDICEConfig, ("subtask",)),
+    "r-maxent": LearnerKind(RMaxEnt, RMaxEntConfig, ("subtask",)),
+}
 
 
 def find_learner(name: str, level: str) -> LearnerKind:

@@ -1,13 +1,15 @@
-"""The network that scores sub-tasks: what is where does not matter, only whether it is there.
+"""The networks that score sub-tasks: what is where does not matter, only whether it is there.
 
 Things stand elsewhere in every demonstration, and a few dozen decisions cannot teach a network
 where they might stand. So each camera's feature maps go through a 1x1 bottleneck and a maximum over
 the picture, as in the paper's section 3.2, and one linear layer chooses.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
 import numpy as np
 import torch
@@ -16,8 +18,13 @@ from torch import Tensor, nn
 
 MAP_SCALE_FLOOR = 0.05
 """Least scale of a channel of the feature maps; one that never changes must not become noise."""
-JOINT_SCALE_FLOOR = 0.05
-"""Least scale of a joint position [rad; m]: at rest they hardly differ, which means nothing."""
+LOW_DIM_SCALE_FLOOR = 0.05
+"""Least scale of a joint position or another number of the state [its unit]: at rest they hardly
+differ, which means nothing."""
+
+Memory = tuple[Tensor, ...]
+"""What a network carries from one decision of an episode to the next, (n, H) each; () if nothing.
+"""
 
 
 @contextmanager
@@ -33,18 +40,23 @@ def one_thread() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class NetworkShape:
-    """Sizes of a `DecisionNetwork`."""
+    """Sizes of a network that chooses sub-tasks."""
 
     cameras: int
-    """K, number of cameras."""
+    """K, number of cameras; 0 when the policy sees the state alone."""
     channels: int
     """C, channels of the feature maps."""
-    joints: int
-    """J, number of joint positions; 0 without."""
+    low_dim: int
+    """S, numbers of the state beside the pictures; 0 without."""
     bottleneck: int
-    """B, channels behind the bottleneck."""
+    """B, channels behind the bottleneck; 0: there is none, and the C channels stay as they are."""
     actions: int
     """A, sub-tasks to choose from."""
+
+    @property
+    def features(self) -> int:
+        """F, length of what the encoder makes of an observation."""
+        return self.cameras * (self.bottleneck or self.channels) + self.low_dim
 
 
 @dataclass(frozen=True)
@@ -53,12 +65,31 @@ class Moments:
 
     map_mean: NDArray[np.float64]  # (K, C)
     map_deviation: NDArray[np.float64]  # (K, C)
-    joint_mean: NDArray[np.float64]  # (J,)
-    joint_deviation: NDArray[np.float64]  # (J,)
+    low_dim_mean: NDArray[np.float64]  # (S,)
+    low_dim_deviation: NDArray[np.float64]  # (S,)
 
 
-class DecisionNetwork(nn.Module):
-    """Feature maps (n, K, C, h, w) and joint positions (n, J) -> logits (n, A).
+class SubtaskNetwork(Protocol):
+    """What a policy asks of its network."""
+
+    kind: ClassVar[str]
+    """Name under which it is saved."""
+    shape: NetworkShape
+
+    @property
+    def settings(self) -> Mapping[str, int]:
+        """What beside the shape is needed to build it again."""
+
+    def step(self, maps: Tensor, low_dim: Tensor, memory: Memory | None) -> tuple[Tensor, Memory]:
+        """Return logits (n, A) for one decision in each of n episodes, and the memory after it."""
+
+    def eval(self) -> nn.Module: ...  # noqa: D102  (torch's)
+
+    def state_dict(self) -> dict[str, Tensor]: ...  # noqa: D102  (torch's)
+
+
+class Encoder(nn.Module):
+    """Feature maps (n, K, C, h, w) and state (n, S) -> features (n, F).
 
     The normaliser is part of the weights. Double precision, so that the order of a sum is not
     amplified by the optimiser: equal training sets give equal parameters.
@@ -66,43 +97,165 @@ class DecisionNetwork(nn.Module):
 
     map_mean: Tensor
     map_scale: Tensor
-    joint_mean: Tensor
-    joint_scale: Tensor
+    low_dim_mean: Tensor
+    low_dim_scale: Tensor
 
-    def __init__(self, shape: NetworkShape, seed: int) -> None:
-        """Draw the initial weights from a generator of their own, seeded with `seed`."""
+    def __init__(self, shape: NetworkShape, random: torch.Generator) -> None:
+        """Draw the bottleneck, where there is one, from `random`."""
         super().__init__()
-        self.shape = shape
         maps, double = (shape.cameras, shape.channels, 1), torch.float64
         self.register_buffer("map_mean", torch.zeros(maps, dtype=double))
         self.register_buffer("map_scale", torch.ones(maps, dtype=double))
-        self.register_buffer("joint_mean", torch.zeros(shape.joints, dtype=double))
-        self.register_buffer("joint_scale", torch.ones(shape.joints, dtype=double))
-        random = torch.Generator().manual_seed(seed)
-        size = (shape.cameras, shape.bottleneck, shape.channels)
-        start = torch.randn(size, generator=random, dtype=double) / shape.channels**0.5
-        self.bottleneck = nn.Parameter(start)
-        self.head = nn.Linear(
-            shape.cameras * shape.bottleneck + shape.joints, shape.actions, dtype=double
-        )
-        # It begins undecided: every sub-task has the same chance.
-        nn.init.zeros_(self.head.weight)
-        nn.init.zeros_(self.head.bias)
+        self.register_buffer("low_dim_mean", torch.zeros(shape.low_dim, dtype=double))
+        self.register_buffer("low_dim_scale", torch.ones(shape.low_dim, dtype=double))
+        self.bottleneck: nn.Parameter | None = None
+        if shape.bottleneck and shape.cameras:
+            size = (shape.cameras, shape.bottleneck, shape.channels)
+            start = torch.randn(size, generator=random, dtype=double) / shape.channels**0.5
+            self.bottleneck = nn.Parameter(start)
 
     def standardise(self, moments: Moments) -> None:
         """Set the normaliser from the moments of the training inputs."""
         self.map_mean.copy_(torch.from_numpy(moments.map_mean)[..., None])
         scale = np.hypot(moments.map_deviation, MAP_SCALE_FLOOR)
         self.map_scale.copy_(torch.from_numpy(scale)[..., None])
-        self.joint_mean.copy_(torch.from_numpy(moments.joint_mean))
-        scale = np.hypot(moments.joint_deviation, JOINT_SCALE_FLOOR)
-        self.joint_scale.copy_(torch.from_numpy(scale))
+        self.low_dim_mean.copy_(torch.from_numpy(moments.low_dim_mean))
+        scale = np.hypot(moments.low_dim_deviation, LOW_DIM_SCALE_FLOOR)
+        self.low_dim_scale.copy_(torch.from_numpy(scale))
 
-    def forward(self, maps: Tensor, joints: Tensor) -> Tensor:
-        """Return logits (n, A) float64."""
-        pixels = maps.flatten(3).double()  # (n, K, C, h * w)
-        seen = self.bottleneck @ ((pixels - self.map_mean) / self.map_scale)
+    def forward(self, maps: Tensor, low_dim: Tensor) -> Tensor:
+        """Return features (n, F) float64."""
+        seen = (maps.flatten(3).double() - self.map_mean) / self.map_scale  # (n, K, C, h * w)
+        if self.bottleneck is not None:
+            seen = self.bottleneck @ seen
         strongest = seen.amax(dim=3).flatten(1)  # (n, K * B)
-        pose = (joints.double() - self.joint_mean) / self.joint_scale
-        logits: Tensor = self.head(torch.cat([strongest, pose], dim=1))
+        numbers = (low_dim.double() - self.low_dim_mean) / self.low_dim_scale
+        return torch.cat([strongest, numbers], dim=1)
+
+
+class DecisionNetwork(nn.Module):
+    """Feature maps (n, K, C, h, w) and state (n, S) -> logits (n, A), without memory."""
+
+    kind: ClassVar[str] = "decision"
+
+    def __init__(self, shape: NetworkShape, seed: int) -> None:
+        """Draw the initial weights from a generator of their own, seeded with `seed`."""
+        super().__init__()
+        self.shape = shape
+        self.encoder = Encoder(shape, torch.Generator().manual_seed(seed))
+        self.head = undecided_head(shape.features, shape.actions)
+
+    @property
+    def settings(self) -> Mapping[str, int]:
+        """Nothing beside the shape."""
+        return {}
+
+    def standardise(self, moments: Moments) -> None:
+        """Set the normaliser from the moments of the training inputs."""
+        self.encoder.standardise(moments)
+
+    def forward(self, maps: Tensor, low_dim: Tensor) -> Tensor:
+        """Return logits (n, A) float64."""
+        logits: Tensor = self.head(self.encoder(maps, low_dim))
         return logits
+
+    def step(
+        self,
+        maps: Tensor,
+        low_dim: Tensor,
+        memory: Memory | None,  # noqa: ARG002  (the protocol's)
+    ) -> tuple[Tensor, Memory]:
+        """Return logits (n, A); nothing is remembered."""
+        return self(maps, low_dim), ()
+
+
+class Ensemble(nn.Module):
+    """Networks that vote: the probability of a sub-task is the mean of the members'."""
+
+    kind: ClassVar[str] = "ensemble"
+
+    def __init__(self, shape: NetworkShape, seed: int, members: int) -> None:
+        """Draw the initial weights of each member from `seed` and its number."""
+        super().__init__()
+        self.shape = shape
+        seeds = np.random.SeedSequence(seed).generate_state(members).tolist()
+        self.members = nn.ModuleList(DecisionNetwork(shape, number) for number in seeds)
+
+    @property
+    def settings(self) -> Mapping[str, int]:
+        """How many members there are."""
+        return {"members": len(self.members)}
+
+    def standardise(self, moments: Moments) -> None:
+        """Set the normaliser of every member from the moments of the training inputs."""
+        for member in self.members:
+            member.standardise(moments)  # type: ignore[operator]
+
+    def forward(self, maps: Tensor, low_dim: Tensor) -> Tensor:
+        """Return logits (n, A) float64, here the logarithm of the mean probability."""
+        votes = torch.stack([member(maps, low_dim).log_softmax(dim=1) for member in self.members])
+        return votes.logsumexp(dim=0) - math.log(len(votes))
+
+    def step(
+        self,
+        maps: Tensor,
+        low_dim: Tensor,
+        memory: Memory | None,  # noqa: ARG002  (the protocol's)
+    ) -> tuple[Tensor, Memory]:
+        """Return logits (n, A); nothing is remembered."""
+        return self(maps, low_dim), ()
+
+
+class RecurrentNetwork(nn.Module):
+    """Decisions of an episode, one after the other -> logits; an LSTM carries what was seen."""
+
+    kind: ClassVar[str] = "recurrent"
+
+    def __init__(self, shape: NetworkShape, seed: int, hidden: int) -> None:
+        """Draw the initial weights from a generator of their own, seeded with `seed`."""
+        super().__init__()
+        self.shape = shape
+        self.hidden = hidden
+        random = torch.Generator().manual_seed(seed)
+        self.encoder = Encoder(shape, random)
+        self.lstm = nn.LSTM(shape.features, hidden, batch_first=True, dtype=torch.float64)
+        for parameter in self.lstm.parameters():
+            nn.init.uniform_(parameter, -(hidden**-0.5), hidden**-0.5, generator=random)
+        self.head = undecided_head(hidden, shape.actions)
+
+    @property
+    def settings(self) -> Mapping[str, int]:
+        """How much is remembered."""
+        return {"hidden": self.hidden}
+
+    def standardise(self, moments: Moments) -> None:
+        """Set the normaliser from the moments of the training inputs."""
+        self.encoder.standardise(moments)
+
+    def forward(self, maps: Tensor, low_dim: Tensor, episodes: Tensor) -> Tensor:
+        """Return logits (n, A) float64 of n decisions.
+
+        `episodes` (n, 2) has each decision's episode (from 0, none left out) and its place in it.
+        """
+        features = self.encoder(maps, low_dim)
+        count, length = (episodes.amax(dim=0) + 1).tolist()
+        padded = features.new_zeros(count, length, features.shape[1])
+        padded[episodes[:, 0], episodes[:, 1]] = features
+        remembered, _ = self.lstm(padded)
+        logits: Tensor = self.head(remembered[episodes[:, 0], episodes[:, 1]])
+        return logits
+
+    def step(self, maps: Tensor, low_dim: Tensor, memory: Memory | None) -> tuple[Tensor, Memory]:
+        """Return logits (n, A) and the memory (n, H), (n, H) of the LSTM: output and cell."""
+        features = self.encoder(maps, low_dim)[:, None]
+        before = None if memory is None else (memory[0][None], memory[1][None])
+        remembered, (output, cell) = self.lstm(features, before)
+        return self.head(remembered[:, 0]), (output[0], cell[0])
+
+
+def undecided_head(features: int, actions: int) -> nn.Linear:
+    """Return a layer (n, F) -> (n, A) that begins undecided: all sub-tasks have one chance."""
+    head = nn.Linear(features, actions, dtype=torch.float64)
+    nn.init.zeros_(head.weight)
+    nn.init.zeros_(head.bias)
+    return head

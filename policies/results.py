@@ -41,7 +41,8 @@ def summary(scores: Mapping[str, Scores]) -> str:
         lines += [
             f"{name} decisions, {len(s.episodes)} episodes",
             f"  policy accuracy  {s.policy_accuracy}   lenient {s.lenient_accuracy}",
-            f"  goal reached     {s.success}   oven left on {s.unsafe}",
+            f"  goal reached     {s.success}   oven left on {s.unsafe}   spilled {s.spills}",
+            *(f"  {subtask:<16} done in {done}" for subtask, done in s.completion.items()),
         ]
     return "\n".join(lines)
 
@@ -112,6 +113,7 @@ def _scores_json(scores: Scores) -> dict[str, Any]:
         "lenient_accuracy": _rate_json(scores.lenient_accuracy),
         "success": _rate_json(scores.success),
         "unsafe": _rate_json(scores.unsafe),
+        "spills": _rate_json(scores.spills),
         "completion": {name: _rate_json(rate) for name, rate in scores.completion.items()},
         "violations": scores.violations,
         "episodes": [asdict(episode) for episode in scores.episodes],

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.base import Observation, ObservationSpec, Policy, pictures
+from policies.captions import caption
 from teasim.errors import CheckpointError, ConfigError
 from teasim.pool.videos import VideoWriter
 
@@ -62,22 +63,29 @@ class Episode:
     """Rules that were broken."""
 
 
-def make_environment(config: EnvironmentConfig, spec: ObservationSpec) -> gym.Env[Any, Any]:
+def make_environment(
+    config: EnvironmentConfig, spec: ObservationSpec, *, filmed: bool = False
+) -> gym.Env[Any, Any]:
     """Make the environment with the observations a policy of `spec` needs.
+
+    `filmed` lets a policy without cameras be watched; one with cameras always can.
 
     Raises:
         ConfigError: there is no such environment, or it does not take the settings.
     """
+    sight: dict[str, Any] = {"obs_type": "state"}
+    if spec.cameras:
+        size = {"width": spec.width, "height": spec.height}
+        sight = {"obs_type": "pixels_agent_pos", "cameras": spec.cameras, **size}
+    elif filmed:
+        sight["render_mode"] = "rgb_array"
     try:
         return gym.make(
             config.env_id,
-            obs_type="pixels_agent_pos",
-            cameras=spec.cameras,
-            width=spec.width,
-            height=spec.height,
             quality=config.quality,
             randomize=config.randomize,
             max_actions=config.max_actions,
+            **sight,
         )
     except (gym.error.Error, TypeError, ImportError) as error:
         reason = " ".join(str(error).split())
@@ -92,24 +100,27 @@ def run_episode(
     deterministic: bool,
     video: Path | None = None,
 ) -> Episode:
-    """Run `policy` until the episode ends; `video` gets what it saw, one frame per decision.
+    """Run `policy` until the episode ends; `video` gets a captioned frame per decision.
 
     Raises:
-        CheckpointError: the policy was trained for other sub-tasks or joints than `env` has.
+        CheckpointError: the policy was trained for other sub-tasks or another state than `env` has.
     """
     policy.set_random_seed(seed)
     observation, info = env.reset(seed=seed)
     check_fit(policy, observation, info)
-    actions, frames, state = [], [_picture(observation, policy)], None
+    actions: list[Action] = []
+    frames, state = [], None
     start, done = np.ones(1, dtype=np.bool_), False
     while not done:
+        if video is not None:
+            frames.append(_picture(env, observation, policy))
         choice, state = policy.predict(observation, state, start, deterministic)
         actions.append(_judge(int(choice), info))
         observation, _, terminated, truncated, info = env.step(int(choice))
-        frames.append(_picture(observation, policy))
         start, done = np.zeros(1, dtype=np.bool_), terminated or truncated
     if video is not None:
-        _write_video(video, frames)
+        frames.append(_picture(env, observation, policy))
+        _write_video(video, frames, [action.name for action in actions], bool(info["success"]))
     return Episode(
         seed,
         tuple(actions),
@@ -128,11 +139,16 @@ def check_fit(policy: Policy, observation: Observation, info: Mapping[str, Any])
             f"The policy chooses from {', '.join(policy.action_names)}, "
             f"but the environment's sub-tasks are {', '.join(names)}."
         )
-    joints = np.shape(observation["agent_pos"])
-    if policy.spec.state_names and joints != (len(policy.spec.state_names),):
+    _check_length("joint positions", policy.spec.state_names, observation["agent_pos"])
+    if policy.spec.environment_names:
+        shown = observation.get("environment_state", ())
+        _check_length("numbers of the environment state", policy.spec.environment_names, shown)
+
+
+def _check_length(what: str, names: tuple[str, ...], shown: Any) -> None:
+    if names and np.shape(shown) != (len(names),):
         raise CheckpointError(
-            f"The policy sees {len(policy.spec.state_names)} joint positions, "
-            f"but the environment shows {joints[0]}."
+            f"The policy sees {len(names)} {what}, but the environment shows {len(shown)}."
         )
 
 
@@ -147,16 +163,23 @@ def _judge(choice: int, info: Mapping[str, Any]) -> Action:
     )
 
 
-def _picture(observation: Observation, policy: Policy) -> NDArray[np.uint8]:
-    """All cameras side by side, (H, cameras * W, 3)."""
+def _picture(env: gym.Env[Any, Any], observation: Observation, policy: Policy) -> Any:
+    """All cameras of the policy side by side, (H, K * W, 3); the environment's own without any."""
+    if not policy.spec.cameras:
+        return env.render()
     return np.hstack(list(pictures(observation, policy.spec.cameras).values()))
 
 
-def _write_video(path: Path, frames: list[NDArray[np.uint8]]) -> None:
-    """Write `frames` (H, W, 3) at one decision per second."""
+def _write_video(
+    path: Path, frames: list[NDArray[np.uint8]], chosen: list[str], success: bool
+) -> None:
+    """Write `frames` (H, W, 3) at one decision per second, below each what was chosen then."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    height, width, _ = frames[0].shape
+    captions = [f"{number} {name}" for number, name in enumerate(chosen, start=1)]
+    captions.append("goal reached" if success else "goal not reached")
+    captioned = [caption(frame, text) for frame, text in zip(frames, captions, strict=True)]
+    height, width, _ = captioned[0].shape
     video = VideoWriter(path, height=height, width=width, fps=1)
-    for frame in frames:
+    for frame in captioned:
         video.add(frame)
     video.close()

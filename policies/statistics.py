@@ -1,11 +1,18 @@
-"""Rates with honest intervals: Wilson's, widened when trials come in correlated groups."""
+"""Rates and differences with honest intervals, wider where trials come in correlated groups."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 Z_95 = 1.959963984540054
 """Two-sided 95 % quantile of the standard normal distribution."""
+
+
+RESAMPLES = 10_000
+"""Times that pairs are drawn anew for the interval of a difference."""
 
 
 @dataclass(frozen=True)
@@ -83,3 +90,51 @@ def _design_effect(groups: Sequence[tuple[int, int]], hits: int, trials: int) ->
         return 1.0
     between = sum((h - share * n) ** 2 for h, n in groups) / trials**2 * count / (count - 1)
     return max(1.0, between / binomial)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A difference of two shares, in [-1, 1], with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        """Write the difference in points, for example '+12.0 points (+3.1 to +20.5)'."""
+        value, low, high = (100 * bound for bound in (self.value, self.low, self.high))
+        return f"{value:+.1f} points ({low:+.1f} to {high:+.1f})"
+
+
+def bootstrap_difference(
+    first: Sequence[tuple[int, int]], second: Sequence[tuple[int, int]], seed: int = 0
+) -> Difference:
+    """Share of hits of `first` minus that of `second`, both (hits, trials) per paired group.
+
+    The interval comes from drawing pairs of groups with replacement (percentile bootstrap; Efron &
+    Tibshirani 1993, chapter 13). A share without a trial counts as 0.
+
+    Raises:
+        ValueError: there is no pair, or not as many groups in both.
+    """
+    if len(first) != len(second) or not first:
+        raise ValueError(f"{len(first)} and {len(second)} groups make no pairs")
+    counts = np.array([first, second], dtype=np.int64)  # (2, n, 2)
+    n = len(first)
+    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), RESAMPLES)
+    low, high = np.quantile(_gaps(np.einsum("rn,pnc->rpc", drawn, counts)), [0.025, 0.975])
+    return Difference(float(_gaps(counts.sum(axis=1)[None])[0]), float(low), float(high))
+
+
+def _gaps(sums: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Difference (r,) of the shares in sums (r, 2, 2) of (hits, trials) of first and second."""
+    shares = sums[..., 0] / np.maximum(sums[..., 1], 1)
+    gaps: NDArray[np.float64] = shares[:, 0] - shares[:, 1]
+    return gaps
+
+
+def mcnemar(only_first: int, only_second: int) -> float:
+    """Two-sided exact p value of McNemar's test from the counts of discordant pairs."""
+    n, fewer = only_first + only_second, min(only_first, only_second)
+    tail = sum(math.comb(n, k) for k in range(fewer + 1)) / 2**n
+    return min(1.0, 2 * tail)

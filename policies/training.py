@@ -4,11 +4,13 @@ import time
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from policies.checkpoint import save_policy
 from policies.demos import DemosConfig, load_decisions
-from policies.learners import find_learner
-from policies.weighting import demo_weights
+from policies.learners import LEARNERS, LearnerKind, find_learner
+from policies.weighting import demo_weights, likely_experts
+from teasim.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.files import check_new_folder
 
@@ -26,7 +28,10 @@ class TrainConfig:
     use: str = "ignore"
     """How the table is used: `discard`, `weight` or `ignore`."""
     observe: str = "auto"
-    """What the policy sees: `auto`, `pixels` or `pixels_agent_pos`."""
+    """What the policy sees: `auto`, `pixels`, `pixels_agent_pos` or `state`."""
+    expert: tuple[int, ...] = ()
+    """Episodes known to be good, for a learner that needs some; empty: the quarter with the largest
+    weights in the table."""
     seed: int = 0
     """Seed of the learner."""
 
@@ -44,10 +49,11 @@ def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int =
     demos = DemosConfig(observe=config.observe)
     pool = Pool.open(pool_path)
     weights = demo_weights(pool, config.weights, config.use)
+    settings = expert_settings(kind, pool, config)
     check_new_folder(run)
     began = time.perf_counter()
     samples = load_decisions(pool, demos, jobs=jobs)
-    learner = kind.make(seed=config.seed).fit(samples, weights)
+    learner = kind.make(seed=config.seed, **settings).fit(samples, weights)
     training = {
         **asdict(config),
         "weights": None if config.weights is None else str(config.weights),
@@ -64,3 +70,42 @@ def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int =
         f"{len(samples.labels)} decisions, loss {learner.history_[-1]:.3f}, "
         f"{seconds:.0f} s -> {run}"
     )
+
+
+def expert_settings(kind: LearnerKind, pool: Pool, config: TrainConfig) -> dict[str, Any]:
+    """Return the setting `experts`, places in the pool, for a learner that takes it.
+
+    Raises:
+        ConfigError: it needs experts and there is no way to choose them, it takes none, or an
+            episode is not in the pool.
+    """
+    if not kind.takes_experts:
+        if config.expert:
+            takers = [name for name, other in LEARNERS.items() if other.takes_experts]
+            raise ConfigError(
+                f"The learner '{config.learner}' takes no --expert; only {', '.join(takers)} does."
+            )
+        return {}
+    if config.expert:
+        return {"experts": places_of(pool, config.expert)}
+    if config.weights is None:
+        raise ConfigError(
+            f"The learner '{config.learner}' needs demonstrations known to be good; name their "
+            "episodes with --expert, or give a weight table with --weights."
+        )
+    return {"experts": likely_experts(pool, config.weights)}
+
+
+def places_of(pool: Pool, episodes: tuple[int, ...]) -> tuple[int, ...]:
+    """Places in `pool` of the episodes with these indexes.
+
+    Raises:
+        ConfigError: the pool has no such episode.
+    """
+    indexes = [episode.index for episode in pool.episodes]
+    unknown = [episode for episode in episodes if episode not in indexes]
+    if unknown:
+        raise ConfigError(
+            f"'{pool.root}' has no episode {unknown[0]}; choose from {indexes[0]} to {indexes[-1]}."
+        )
+    return tuple(indexes.index(episode) for episode in episodes)

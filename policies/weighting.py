@@ -35,6 +35,36 @@ def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64
         raise ConfigError(f"Use '{use}' needs a weight table; give one with --weights.")
     if table is None:
         return np.ones(len(pool.episodes))
+    rows = _rows_of(pool, table)
+    weights = np.array([_weight(row, use) for row in rows])
+    if not weights.any():
+        raise ConfigError(
+            f"With use '{use}' the weight table '{table}' leaves no demonstration to learn from; "
+            f"choose another use ({', '.join(USES)})."
+        )
+    return weights
+
+
+def likely_experts(pool: Pool, table: Path) -> tuple[int, ...]:
+    """Places in `pool` of the quarter of its demonstrations, at least one, with the largest weight.
+
+    Of equal weights the one with the smaller loss goes first; flagged demonstrations go last.
+
+    Raises:
+        ConfigError: the table belongs to another pool.
+        PoolError: the table cannot be read.
+    """
+    rows = _rows_of(pool, table)
+    order = sorted(range(len(rows)), key=lambda place: _rank(rows[place]))
+    return tuple(sorted(order[: max(1, len(rows) // 4)]))
+
+
+def _rank(row: WeightRow) -> tuple[bool, float, float]:
+    return row.flagged, -row.weight, row.loss
+
+
+def _rows_of(pool: Pool, table: Path) -> list[WeightRow]:
+    """Rows of `table` in the order of the demonstrations of `pool`."""
     rows = {row.demo_id: row for row in read_weight_table(table)}
     missing = [episode for episode in pool.episodes if episode.demo_id not in rows]
     if len(missing) == len(pool.episodes):
@@ -47,13 +77,7 @@ def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64
             f"The weight table '{table}' lacks {len(missing)} of the {len(pool.episodes)} "
             f"demonstrations of '{pool.root}', the first is episode {missing[0].index}."
         )
-    weights = np.array([_weight(rows[episode.demo_id], use) for episode in pool.episodes])
-    if not weights.any():
-        raise ConfigError(
-            f"With use '{use}' the weight table '{table}' leaves no demonstration to learn from; "
-            f"choose another use ({', '.join(USES)})."
-        )
-    return weights
+    return [rows[episode.demo_id] for episode in pool.episodes]
 
 
 def _weight(row: WeightRow, use: str) -> float:
@@ -99,9 +123,7 @@ def weighted_moments(samples: DecisionSamples, shares: NDArray[np.float64]) -> M
     squares = np.stack([np.square(maps, dtype=np.float64).mean(axis=rest) for maps in samples.maps])
     map_mean = np.tensordot(shares, means, axes=1)
     map_variance = np.tensordot(shares, squares, axes=1) - map_mean**2
-    joints = samples.joints.astype(np.float64)
-    joint_mean = shares @ joints
-    joint_variance = shares @ (joints - joint_mean) ** 2
-    return Moments(
-        map_mean, np.sqrt(np.maximum(map_variance, 0.0)), joint_mean, np.sqrt(joint_variance)
-    )
+    numbers = samples.low_dim.astype(np.float64)
+    mean = shares @ numbers
+    deviation = np.sqrt(shares @ (numbers - mean) ** 2)
+    return Moments(map_mean, np.sqrt(np.maximum(map_variance, 0.0)), mean, deviation)

@@ -16,6 +16,8 @@ from teasim.pool import EpisodeRecord, EpisodeWriter, Pool, PoolHeader, Span, fi
 SEQ_1 = (0, 4, 2, 3, 6, 1, 5)
 BEFORE = ((0, 6), (6, 1), (4, 5), (1, 5), (2, 5), (3, 5), (0, 1), (0, 2), (0, 3), (0, 4))
 SIZE = 64
+FLAGS = tuple(f"{name}_done" for name in SUBTASKS)
+"""The environment state."""
 
 FAKE_ID = "tests.policies.fakes:teasim-tests/Fake-v0"
 FAKE_WORLD = EnvironmentConfig(FAKE_ID)
@@ -31,28 +33,43 @@ def picture(done: set[int], random: np.random.Generator) -> NDArray[np.uint8]:
     return image.clip(0, 255).astype(np.uint8)
 
 
+def flags(done: set[int]) -> NDArray[np.float32]:
+    """One number per sub-task: whether it was done."""
+    return np.isin(np.arange(len(FLAGS)), list(done)).astype(np.float32)
+
+
 class FakeTea(gym.Env[dict[str, Any], int]):
     """The sub-task environment without physics: every allowed action works, others do nothing."""
 
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
+
     def __init__(
         self,
-        obs_type: str,
-        cameras: tuple[str, ...],
-        width: int,
-        height: int,
-        quality: str,
-        randomize: bool,
-        max_actions: int,
+        obs_type: str = "state",
+        cameras: tuple[str, ...] = ("left", "cup"),
+        width: int = SIZE,
+        height: int = SIZE,
+        render_mode: str | None = None,
+        quality: str = "fast",
+        randomize: bool = True,
+        max_actions: int = 14,
     ) -> None:
-        assert obs_type == "pixels_agent_pos"
+        assert obs_type in ("state", "pixels_agent_pos")
         assert (quality, randomize, width, height) == ("fast", True, SIZE, SIZE)
+        self.obs_type = obs_type
         self.cameras = cameras
+        self.render_mode = render_mode
         self.max_actions = max_actions
         self.action_space = gym.spaces.Discrete(len(SUBTASKS))
         frame = gym.spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8)
+        pixels = gym.spaces.Dict(dict.fromkeys(cameras, frame)) if len(cameras) > 1 else frame
         self.observation_space = gym.spaces.Dict(
             agent_pos=gym.spaces.Box(-4, 4, (len(STATE_NAMES),), np.float32),
-            pixels=gym.spaces.Dict(dict.fromkeys(cameras, frame)),
+            **(
+                {"environment_state": gym.spaces.Box(0, 1, (len(FLAGS),), np.float32)}
+                if obs_type == "state"
+                else {"pixels": pixels}
+            ),
         )
 
     def reset(self, *, seed: int | None = None, options: Any = None) -> Any:  # noqa: ARG002
@@ -76,10 +93,17 @@ class FakeTea(gym.Env[dict[str, Any], int]):
         waiting = [b for a, b in BEFORE if a not in self.done]
         return [a for a in range(len(SUBTASKS)) if a not in self.done and a not in waiting]
 
+    def render(self) -> NDArray[np.uint8]:
+        assert self.render_mode == "rgb_array"
+        return picture(set(self.done), self.np_random)
+
     def _observe(self) -> dict[str, Any]:
-        frames = {camera: picture(set(self.done), self.np_random) for camera in self.cameras}
         joints = self.np_random.normal(0, 1e-4, len(STATE_NAMES)).astype(np.float32)
-        return {"agent_pos": joints, "pixels": frames}
+        if self.obs_type == "state":
+            return {"agent_pos": joints, "environment_state": flags(set(self.done))}
+        frames = {camera: picture(set(self.done), self.np_random) for camera in self.cameras}
+        seen = frames if len(frames) > 1 else frames[self.cameras[0]]
+        return {"agent_pos": joints, "pixels": seen}
 
     def _info(self) -> dict[str, Any]:
         left = [action for action in SEQ_1 if action not in self.done]
@@ -107,7 +131,7 @@ def make_fake_pool(
         width=SIZE,
         subtasks=SUBTASKS,
         state_names=STATE_NAMES if joints else None,
-        environment_state_names=None,
+        environment_state_names=FLAGS if joints else None,
         robot_type="abb_yumi" if joints else None,
         config={"seed": seed},
     )
@@ -129,6 +153,7 @@ def _write_episode(path: Path, index: int, header: PoolHeader, sequence: Sequenc
                 writer.add_frame(
                     images={camera: picture(done, random) for camera in header.cameras},
                     state=logged,
+                    environment_state=flags(done) if header.state_names else None,
                     action=logged,
                     subtask_index=subtask if frame >= 2 else -1,
                 )

@@ -7,6 +7,7 @@ import pytest
 
 from policies.checkpoint import load_policy, save_policy
 from policies.cli import evaluate, train
+from policies.learners import LEARNERS
 from policies.rollout import ENVIRONMENT
 from teasim.errors import CheckpointError, ConfigError, PoolError, TeasimError
 from teasim.pool.weight_table import WeightRow, write_weight_table
@@ -73,6 +74,38 @@ def test_flagged_demonstrations_are_left_out(fake_pool, tmp_path, capsys):
     assert training["use"] == "discard"
 
 
+@pytest.mark.parametrize("learner", LEARNERS)
+def test_every_learner_makes_tea_from_the_state(learner, fake_pool, tmp_path, capsys):
+    rows = [
+        WeightRow(e.demo_id, e.index, 1.0 - e.index / 10, 0.0, False, 0, "")
+        for e in fake_pool.episodes
+    ]
+    write_weight_table(tmp_path / "weights.csv", rows)
+    run = tmp_path / "run"
+    options = ["--learner", learner, "--observe", "state", "-o", str(run), "--jobs", "1"]
+    options += ["--weights", str(tmp_path / "weights.csv")]
+    assert train([str(fake_pool.root), *options]) == 0
+    assert try_out(run, "--min-policy-accuracy", 100) == 0, capsys.readouterr().out
+
+
+def test_experts_are_named_by_episode_or_have_the_largest_weights(fake_pool, tmp_path):
+    rows = [
+        WeightRow(e.demo_id, e.index, e.index / 10, 0.0, e.index == 6, 0, "")
+        for e in fake_pool.episodes
+    ]
+    write_weight_table(tmp_path / "weights.csv", rows)
+    common = ["--learner", "demodice", "--observe", "state", "--jobs", "1"]
+    table = ["--weights", str(tmp_path / "weights.csv")]
+    for name, options in (("named", ["--expert", "1", "3"]), ("default", table)):
+        train([str(fake_pool.root), *common, *options, "-o", str(tmp_path / name)])
+    found = [
+        json.loads((tmp_path / name / "policy.json").read_text())["training"]["settings"]["experts"]
+        for name in ("named", "default")
+    ]
+    # A quarter of seven is one: the largest weight is flagged, the next is episode 5.
+    assert found == [[1, 3], [5]]
+
+
 def refused(error, call):
     with pytest.raises(error) as caught:
         call()
@@ -95,14 +128,23 @@ def test_a_folder_in_use_is_left_alone(fake_pool, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--learner", "sac"], "Unknown learner 'sac'; choose bc."),
+        (["--learner", "sac"], f"Unknown learner 'sac'; choose {', '.join(LEARNERS)}."),
         (["--level", "joint"], "The learner 'bc' has no level 'joint'; choose subtask."),
         (["--use", "drop"], "Unknown use 'drop' of weights; choose discard, weight, ignore."),
         (
             ["--observe", "sound"],
-            "Unknown observe 'sound'; choose auto, pixels, pixels_agent_pos.",
+            "Unknown observe 'sound'; choose auto, pixels, pixels_agent_pos, state.",
         ),
         (["--jobs", "0"], "jobs is 0; choose 1 or more."),
+        (
+            ["--learner", "demodice"],
+            "The learner 'demodice' needs demonstrations known to be good; name their episodes "
+            "with --expert, or give a weight table with --weights.",
+        ),
+        (
+            ["--expert", "0"],
+            "The learner 'bc' takes no --expert; only demodice does.",
+        ),
     ],
 )
 def test_bad_options_make_nothing(fake_pool, tmp_path, options, said):
@@ -111,6 +153,13 @@ def test_bad_options_make_nothing(fake_pool, tmp_path, options, said):
         refused(ConfigError, lambda: train([str(fake_pool.root), *options, "-o", str(out)])) == said
     )
     assert not out.exists()
+
+
+def test_an_expert_of_another_pool_makes_nothing(fake_pool, tmp_path):
+    options = ["--learner", "demodice", "--expert", "7", "-o", str(tmp_path / "run")]
+    said = refused(ConfigError, lambda: train([str(fake_pool.root), *options]))
+    assert said == f"'{fake_pool.root}' has no episode 7; choose from 0 to 6."
+    assert not (tmp_path / "run").exists()
 
 
 def test_no_pool_makes_nothing(tmp_path):
@@ -130,3 +179,15 @@ def test_a_result_file_that_is_a_folder_is_found_before_the_work(run, tmp_path):
 
 def test_the_usual_environment_is_the_tea_station():
     assert ENVIRONMENT == "teasim:teasim/TeaMakingSubtasks-v0"
+
+
+def test_two_policies_are_compared_on_the_same_episodes(run, stirrer, tmp_path, capsys):
+    assert try_out(run, "--against", stirrer, "--json", tmp_path / "s.json") == 0
+    assert f"beside {stirrer} on the same 3 episodes" in capsys.readouterr().out
+    saved = json.loads((tmp_path / "s.json").read_text())
+    assert saved["against"] == str(stirrer)
+    assert saved["comparison"]["deterministic"]["success"] == {
+        "first": 3,
+        "second": 0,
+        "p_value": 0.25,
+    }

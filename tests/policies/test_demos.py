@@ -9,6 +9,7 @@ from policies.features import camera_maps
 from teasim.constants import STATE_NAMES, SUBTASKS
 from teasim.errors import ConfigError, PoolError
 from teasim.pool import read_frames
+from tests.policies.fakes import FLAGS
 
 
 def test_decisions_of_a_pool(decisions):
@@ -18,7 +19,7 @@ def test_decisions_of_a_pool(decisions):
     assert decisions.maps.shape == (6 * 7 + 6, 2, 2, 112, 4, 4)
     np.testing.assert_array_equal(np.bincount(decisions.demos), [7] * 6 + [6])
     np.testing.assert_array_equal(decisions.labels[:7], [0, 4, 2, 3, 6, 1, 5])
-    assert np.abs(decisions.joints).max() < 1e-3  # at rest, as at the start of every span
+    assert np.abs(decisions.low_dim).max() < 1e-3  # at rest, as at the start of every span
     assert not decisions.maps.flags.writeable
 
 
@@ -46,7 +47,7 @@ def test_the_number_of_workers_changes_nothing(fake_pool, decisions):
 def test_a_pool_without_joints_is_learned_from_its_frames(human_pool):
     samples = load_decisions(human_pool)
     assert samples.spec.state_names == ()
-    assert samples.joints.shape == (7, 0)
+    assert samples.low_dim.shape == (7, 0)
     with pytest.raises(ConfigError) as error:
         load_decisions(human_pool, DemosConfig(observe="pixels_agent_pos"))
     assert str(error.value) == (
@@ -58,7 +59,7 @@ def test_frames_alone_and_one_camera_can_be_asked_for(human_pool):
     one = load_decisions(human_pool, DemosConfig(observe="pixels", cameras=("cup",), copies=0))
     assert one.spec == ObservationSpec(("cup",), 64, 64)
     assert one.maps.shape[1:3] == (1, 1)
-    assert one.joints.shape == (7, 0)
+    assert one.low_dim.shape == (7, 0)
 
 
 def test_an_unknown_camera_names_the_choices(fake_pool):
@@ -69,8 +70,10 @@ def test_an_unknown_camera_names_the_choices(fake_pool):
 
 def test_unknown_settings_name_the_choices():
     with pytest.raises(ConfigError) as error:
-        DemosConfig(observe="state")
-    assert str(error.value) == "Unknown observe 'state'; choose auto, pixels, pixels_agent_pos."
+        DemosConfig(observe="sound")
+    assert str(error.value) == (
+        "Unknown observe 'sound'; choose auto, pixels, pixels_agent_pos, state."
+    )
     with pytest.raises(ConfigError, match=r"^copies is -1; choose 0 or more\.$"):
         DemosConfig(copies=-1)
 
@@ -79,3 +82,27 @@ def test_a_pool_without_labels_has_no_decisions(fake_pool, monkeypatch):
     monkeypatch.setattr(type(fake_pool), "subtasks", ())
     with pytest.raises(PoolError, match="has no sub-task labels, so there is no decision"):
         load_decisions(fake_pool)
+
+
+def test_the_state_alone_needs_no_frame(fake_pool):
+    samples = load_decisions(fake_pool, DemosConfig(observe="state"))
+    assert samples.spec == ObservationSpec((), 0, 0, STATE_NAMES, FLAGS)
+    assert samples.maps.shape == (48, 1, 0, 0, 1, 1)
+    np.testing.assert_array_equal(samples.low_dim[3, -7:], [1, 0, 1, 0, 1, 0, 0])
+    assert np.abs(samples.low_dim[:, :-7]).max() < 1e-3
+
+
+def test_a_state_that_was_not_logged_is_named(human_pool, fake_pool, monkeypatch):
+    with pytest.raises(ConfigError) as error:
+        load_decisions(human_pool, DemosConfig(observe="state"))
+    assert str(error.value) == (
+        f"'{human_pool.root}' logs no joint positions; choose observe auto or pixels instead."
+    )
+    features = {key: spec for key, spec in fake_pool.info["features"].items() if "env" not in key}
+    monkeypatch.setattr(type(fake_pool), "info", {"features": features})
+    with pytest.raises(ConfigError) as error:
+        load_decisions(fake_pool, DemosConfig(observe="state"))
+    assert str(error.value) == (
+        f"'{fake_pool.root}' logs no environment state; choose observe auto, pixels or "
+        "pixels_agent_pos instead."
+    )

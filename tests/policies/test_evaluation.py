@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from policies.evaluation import MODES, EvaluationConfig, evaluate
-from policies.rollout import EnvironmentConfig, make_environment, run_episode
+from policies.base import ObservationSpec
+from policies.captions import STRIP, caption
+from policies.evaluation import MODES, EvaluationConfig, evaluate, score
+from policies.rollout import EnvironmentConfig, Episode, make_environment, run_episode
 from policies.statistics import rate
+from teasim.constants import STATE_NAMES
 from teasim.errors import CheckpointError, ConfigError
 from teasim.pool.videos import VideoClip, count_decodable, read_frames
-from tests.policies.fakes import FAKE_WORLD, SEQ_1, SUBTASKS, ScriptedPolicy
+from tests.policies.fakes import FAKE_WORLD, FLAGS, SEQ_1, SUBTASKS, ScriptedPolicy
 
 
 def config(episodes=3, **others):
@@ -79,6 +82,12 @@ def test_a_policy_with_other_joints_is_refused():
     policy.spec = type(policy.spec)(("left",), 64, 64, ("elbow",))
     with pytest.raises(CheckpointError, match=r"sees 1 joint positions, .* shows 16\.$"):
         evaluate(policy, config(1))
+    policy.spec = ObservationSpec((), 0, 0, STATE_NAMES, ("kettle_x",))
+    with pytest.raises(CheckpointError) as error:
+        evaluate(policy, config(1))
+    assert str(error.value) == (
+        "The policy sees 1 numbers of the environment state, but the environment shows 7."
+    )
 
 
 def test_an_unknown_environment_is_named():
@@ -98,6 +107,30 @@ def test_the_video_has_one_frame_per_decision_and_the_last(tmp_path):
     clip = VideoClip(tmp_path / "seen" / "episode_1000.mp4", 0, 8)
     assert count_decodable(clip.path) == 8
     frames = read_frames(clip, range(8))
-    assert frames.shape == (8, 64, 128, 3)
-    assert np.ptp(frames[0].mean(axis=(1, 2))) < 3
-    assert np.ptp(frames[-1].mean(axis=(1, 2))) > 10
+    assert frames.shape == (8, 64 + STRIP, 128, 3)
+    pictures, strips = frames[:, :64], frames[:, 64:]
+    assert np.ptp(pictures[0].mean(axis=(1, 2))) < 3
+    assert np.ptp(pictures[-1].mean(axis=(1, 2))) > 10
+    assert (strips.max(axis=(1, 2, 3)) > 150).all()  # every strip holds a text
+
+
+def test_a_policy_without_cameras_can_be_filmed_and_sees_no_picture(tmp_path):
+    policy = ScriptedPolicy()
+    policy.spec = ObservationSpec((), 0, 0, STATE_NAMES, FLAGS)
+    s = evaluate(policy, config(1, video=tmp_path / "seen"))["deterministic"]
+    assert s.success.value == 1
+    assert count_decodable(tmp_path / "seen" / "episode_1000.mp4") == 8
+
+
+def test_a_caption_leaves_the_picture_alone_and_fits():
+    frame = np.full((64, 64, 3), 90, dtype=np.uint8)
+    captioned = caption(frame, "5 turn_off_oven")
+    np.testing.assert_array_equal(captioned[:64], frame)
+    lit = captioned[64:].any(axis=(0, 2))
+    assert lit[:50].any()
+    assert not lit[-2:].any()
+
+
+def test_spills_are_counted_by_episode():
+    seen = [Episode(0, (), False, False, (), rules) for rules in (("spilled_water",), ("x",), ())]
+    assert score("sampled", seen, ()).spills == rate(1, 3)

@@ -24,6 +24,7 @@ def test_json_has_rates_in_percent_and_every_episode(tmp_path):
     s = saved["scores"]["sampled"]
     assert s["policy_accuracy"]["percent"] == 50
     assert s["policy_accuracy"]["hits"] == 1
+    assert s["spills"]["percent"] == s["completion"]["stir"]["percent"] == 0
     assert [a["correct"] for a in s["episodes"][0]["actions"]] == [True, False]
 
 
@@ -56,7 +57,10 @@ def test_junit_without_a_bar_never_fails_and_tells_the_story(tmp_path):
 
 
 def test_summary_is_in_percent():
-    assert "policy accuracy  50.0 % (" in summary(scores_of(True, False))
+    text = summary(scores_of(True, False))
+    assert "policy accuracy  50.0 % (" in text
+    assert "spilled 0.0 % (" in text
+    assert "  stir             done in 0.0 % (" in text
 
 
 @pytest.mark.parametrize(

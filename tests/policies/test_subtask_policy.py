@@ -56,7 +56,7 @@ def test_one_observation_and_a_batch_agree(batch):
     seeded = torch.Generator().manual_seed(0)
     network.head.weight.data.normal_(0, 0.01, generator=seeded)  # far from certain of anything
     policy = SubtaskPolicy(network, SPEC, SUBTASKS)
-    together, alone = policy.probabilities(batch), policy.probabilities(first(batch))
+    (together, _), (alone, _) = policy.probabilities(batch), policy.probabilities(first(batch))
     np.testing.assert_allclose(together[0], alone, rtol=1e-4)
     assert np.abs(together[0] - together[1]).max() > 1e-6
 

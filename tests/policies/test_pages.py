@@ -1,0 +1,51 @@
+"""What the pages on policies say can be done."""
+
+import re
+import shlex
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from policies import cli
+from policies.learners import LEARNERS
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = {name: (DOCS / name).read_text() for name in ("ci.md", "policies.md")}
+
+
+def commands(page):
+    """Verb and options of every command line on `page`; a folded one is one line."""
+    text = re.sub(r"\n +(?=--)", " ", re.sub(r"run: >\n +", "run: ", PAGES[page]))
+    for line in re.findall(r"teasim (?:train|evaluate|ablate) [^\n`]*", text):
+        _, verb, *words = shlex.split(line)
+        yield verb, [word for word in words if word.startswith("--")]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_options_of_the_commands_exist(page, capsys):
+    found = list(commands(page))
+    assert len(found) >= 2
+    for verb, options in found:
+        with pytest.raises(SystemExit):
+            getattr(cli, verb)(["--help"])
+        known = capsys.readouterr().out
+        assert [option for option in options if not re.search(rf"{option}\b", known)] == []
+
+
+def test_the_build_sets_a_bar_and_keeps_the_scores():
+    (options,) = (options for _, options in commands("ci.md") if "--junit" in options)
+    assert {"--min-policy-accuracy", "--json", "--episodes", "--seed"} <= set(options)
+
+
+def test_every_learner_is_in_the_table():
+    assert re.findall(r"^\| `([a-z][\w-]*)` \|", PAGES["policies.md"], re.MULTILINE) == list(
+        LEARNERS
+    )
+
+
+def test_what_the_python_imports_exists():
+    imports = re.findall(r"^from ([\w.]+) import (.+)$", PAGES["policies.md"], re.MULTILINE)
+    assert len(imports) == 5
+    for module, names in imports:
+        assert all(hasattr(import_module(module), name) for name in names.split(", "))
