@@ -1,19 +1,26 @@
 """Laws that every learner keeps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
-from policies.base import DecisionSamples
 from policies.learners import LEARNERS, find_learner
 from teasim.errors import ConfigError
-from tests.policies.learning import make, replay
+from tests.policies.learning import AT_SUBTASKS, make, replay
 
 EVERY = pytest.mark.parametrize("name", LEARNERS)
 
 
 SEEDLESS = {"r-maxent"}
 """Learners that draw nothing: every seed gives the same."""
+
+
+@pytest.fixture
+def samples(name, samples, motions):
+    """What the learner `name` is given: 5 demonstrations of 6 rows, the last of which errs."""
+    return motions if LEARNERS[name].levels == ("joint",) else samples
 
 
 def fit(name, samples, weights, seed=0):
@@ -46,9 +53,7 @@ def test_weight_2_equals_the_demonstration_twice(name, samples):
     rows = np.arange(30)
     taken = samples.take(np.concatenate([rows, rows[samples.demos == 2]]))
     demos = np.where(np.arange(36) < 30, taken.demos, 5)
-    twice = DecisionSamples(
-        taken.maps, taken.low_dim, taken.labels, demos, taken.spec, taken.action_names
-    )
+    twice = replace(taken, demos=demos)
     assert_same(fit(name, samples, [1, 1, 2, 1, 1]), fit(name, twice, np.ones(6)), **CLOSE)
 
 
@@ -98,7 +103,7 @@ def test_learning_lowers_the_loss_and_fit_returns_self(name, samples):
     assert learner.history_[-1] < 0.7 * learner.history_[0]
 
 
-@EVERY
+@pytest.mark.parametrize("name", AT_SUBTASKS)
 def test_a_clear_majority_decides(name, samples):
     policy = fit(name, samples, np.ones(5)).policy_
     right = samples.take(samples.demos != 4)
@@ -129,6 +134,9 @@ def test_an_unknown_learner_or_level_names_the_choices():
     with pytest.raises(ConfigError) as error:
         find_learner("bc", "joint")
     assert str(error.value) == "The learner 'bc' has no level 'joint'; choose subtask."
+    with pytest.raises(ConfigError) as error:
+        find_learner("bc-chunk", "subtask")
+    assert str(error.value) == "The learner 'bc-chunk' has no level 'subtask'; choose joint."
 
 
 @EVERY
@@ -147,6 +155,16 @@ def test_no_learner_starts_with_settings_that_cannot_train(name):
         ),
         ("bc", {"bottleneck": 0}, "bottleneck is 0; choose 1 or more."),
         ("bc-rnn", {"hidden": 0}, "hidden is 0; choose 1 or more."),
+        (
+            "bc-chunk",
+            {"chunk": 0},
+            "bc-chunk needs chunk, style, hidden and batch >= 1 and noise >= 0.",
+        ),
+        (
+            "bc-chunk",
+            {"noise": -0.1},
+            "bc-chunk needs chunk, style, hidden and batch >= 1 and noise >= 0.",
+        ),
         ("bcnd", {"members": 0}, "bcnd needs members >= 1 and rounds >= 1."),
         ("demodice", {"gamma": 1.0}, "gamma is 1.0; choose more than 0 and less than 1."),
         ("demodice", {"alpha": -1.0}, "demodice needs alpha >= 0 and gradient_penalty >= 0."),
