@@ -3,7 +3,8 @@
 After ACT (Zhao et al., "Learning Fine-Grained Bimanual Manipulation with Low-Cost Hardware", RSS
 2023): chunks, the L1 loss, a style variable, temporal ensembling. Instead of inferring the style as
 ACT's variational encoder does, every demonstration has its own: there are few, and what they differ
-in (tempo, path, pauses) lasts for the whole of one. The input noise shows the way back to the path.
+in (tempo, path, pauses) lasts for the whole of one. The policy's memory is the time since the start
+of the episode. The input noise shows the way back to the path.
 """
 
 import hashlib
@@ -29,15 +30,15 @@ from teasim.errors import ConfigError
 class BCChunkConfig:
     """Settings of behaviour cloning with chunks."""
 
-    chunk: int = 32
-    """H, control steps (0.1 s) decided at once; longer than any pause."""
+    chunk: int = 16
+    """H, control steps (0.1 s) decided at once."""
     style: int = 16
     """Z, numbers that tell the style of a demonstration."""
     hidden: int = 384
     """Width of the hidden layers."""
     noise: float = 0.04
     """Largest deviation of the input noise [spreads of the number in the pool]."""
-    steps: int = 2500
+    steps: int = 3000
     """Gradient steps."""
     batch: int = 256
     """Chunks per gradient step."""
@@ -78,12 +79,17 @@ class Motions:
         """Steps of each demonstration, (D,)."""
         return np.diff(self.stops, prepend=0)
 
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """Where each demonstration begins, (D,)."""
+        return self.stops - self.lengths
+
     def draw(self, random: np.random.Generator, count: int) -> tuple[NDArray[np.int64], ...]:
         """Draw `count` steps by weight: their rows and their demonstrations, (count,) each."""
         edges = np.cumsum(self.shares)
         demos = np.searchsorted(edges, random.random(count) * edges[-1], side="right")
         lengths = self.lengths[demos]
-        rows = self.stops[demos] - lengths + (random.random(count) * lengths).astype(np.int64)
+        rows = self.starts[demos] + (random.random(count) * lengths).astype(np.int64)
         return rows, demos
 
     def chunks(
@@ -98,7 +104,7 @@ class Motions:
 
 
 class BCChunk:
-    """minimise over theta: sum_i w_i |a_i .. a_i+H-1 - pi_theta(s_i, style of the demo)|_1."""
+    """minimise over theta: sum_i w_i |a_i .. a_i+H-1 - pi_theta(s_i, style of the demo, i)|_1."""
 
     policy_: MotionPolicy
     history_: tuple[float, ...]
@@ -190,8 +196,8 @@ def _descend(network: ChunkNetwork, motions: Motions, config: BCChunkConfig) -> 
         seen = exact + config.noise * network.seen_scale * _noise(exact.shape, random)
         chunks = torch.from_numpy(motions.chunks(rows, demos, config.chunk))
         optimizer.zero_grad()
-        missed = network.moves(seen, torch.from_numpy(demos)) - network.as_moves(seen, chunks)
-        loss = missed.abs().mean()
+        course = torch.from_numpy(demos), torch.from_numpy(rows - motions.starts[demos])
+        loss = (network.moves(seen, *course) - network.as_moves(seen, chunks)).abs().mean()
         loss.backward()
         optimizer.step()
         schedule.step()
@@ -214,12 +220,12 @@ def _rate_styles(network: ChunkNetwork, motions: Motions) -> None:
     """Note in `network` the weight of every style and how far its targets are missed."""
     chances = motions.shares / motions.lengths
     network.chances.copy_(torch.from_numpy(chances / chances.sum()))
-    starts = motions.stops - motions.lengths
-    for demo, (start, stop) in enumerate(zip(starts, motions.stops, strict=True)):
+    for demo, (start, stop) in enumerate(zip(motions.starts, motions.stops, strict=True)):
         rows = np.arange(start, stop)
         demos = np.full(len(rows), demo)
         seen = torch.from_numpy(motions.low_dim[rows])
         chunks = torch.from_numpy(motions.chunks(rows, demos, network.shape.chunk))
         with torch.no_grad():
-            missed = network.moves(seen, torch.from_numpy(demos)) - network.as_moves(seen, chunks)
+            course = torch.from_numpy(demos), torch.from_numpy(rows - start)
+            missed = network.moves(seen, *course) - network.as_moves(seen, chunks)
         network.errors[demo] = missed.abs().mean()

@@ -1,10 +1,12 @@
-"""The network of the joint level: what is seen and a style -> the targets of the next steps.
+"""The network of the joint level: what is seen, when, in which style -> the next targets.
 
 A chunk of targets instead of one (Zhao et al., "Learning Fine-Grained Bimanual Manipulation with
-Low-Cost Hardware", RSS 2023, section IV) makes few decisions of many, and bridges pauses, in which
-nothing that can be seen tells when they end.
+Low-Cost Hardware", RSS 2023, section IV) lets every target be the mean of many predictions. The
+time since the start of the episode is all the memory there is: while a hand rests or a gripper
+closes, nothing that can be seen tells how long it has done so.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,6 +25,8 @@ MOVE_SCALE_FLOOR = 1e-3
 FARTHEST = 5.0
 """Largest input of the network [scales]; beyond it nothing was learned."""
 LAYERS = 3
+PERIODS = 2.0 ** torch.arange(11, 2, -1)
+"""Periods of the waves that tell the time [control steps]; no episode outlasts the longest."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class ChunkShape:
 
 
 class ChunkNetwork(nn.Module):
-    """State (n, S) and style (n,) -> targets (n, H, J) [rad; m for grippers].
+    """State (n, S), style (n,) and time (n,) -> targets (n, H, J) [rad; m for grippers].
 
     Targets are learned relative to the present joint positions and by their own spread at each step
     of the chunk, so that a millimetre counts where motion is small. The normaliser is part of the
@@ -72,7 +76,7 @@ class ChunkNetwork(nn.Module):
         self.register_buffer("chances", torch.full((shape.styles,), 1 / shape.styles))
         self.register_buffer("errors", torch.zeros(shape.styles))
         self.styles = nn.Parameter(torch.randn(shape.styles, shape.style, generator=random))
-        sizes = [shape.low_dim + shape.style, *[shape.hidden] * LAYERS]
+        sizes = [shape.low_dim + shape.style + 2 * len(PERIODS), *[shape.hidden] * LAYERS]
         layers: list[nn.Module] = []
         for inputs, outputs in pairwise(sizes):
             layers += [_linear(inputs, outputs, random), nn.LayerNorm(outputs), nn.GELU()]
@@ -95,10 +99,13 @@ class ChunkNetwork(nn.Module):
         self.move_mean.copy_(torch.from_numpy(moves[0]))
         self.move_scale.copy_(torch.from_numpy(np.hypot(moves[1], MOVE_SCALE_FLOOR)))
 
-    def moves(self, low_dim: Tensor, style: Tensor) -> Tensor:
-        """Return the standardised moves (n, H, J) for `low_dim` (n, S) in the styles (n,)."""
+    def moves(self, low_dim: Tensor, style: Tensor, time: Tensor) -> Tensor:
+        """Return the standardised moves (n, H, J) for `low_dim` (n, S) in the styles (n,).
+
+        `time` (n,) is the number of control steps since the episode began.
+        """
         seen = ((low_dim - self.seen_mean) / self.seen_scale).clamp(-FARTHEST, FARTHEST)
-        told = self.layers(torch.cat([seen, self.styles[style]], dim=1))
+        told = self.layers(torch.cat([seen, self.styles[style], _waves(time)], dim=1))
         moves: Tensor = told.view(-1, self.shape.chunk, self.shape.actions)
         return moves
 
@@ -106,12 +113,19 @@ class ChunkNetwork(nn.Module):
         """Standardise `targets` (n, H, J) as seen from `low_dim` (n, S)."""
         return (targets - self._here(low_dim) - self.move_mean) / self.move_scale
 
-    def forward(self, low_dim: Tensor, style: Tensor) -> Tensor:
+    def forward(self, low_dim: Tensor, style: Tensor, time: Tensor) -> Tensor:
         """Return targets (n, H, J) [rad; m for grippers]."""
-        return self.moves(low_dim, style) * self.move_scale + self.move_mean + self._here(low_dim)
+        moves = self.moves(low_dim, style, time)
+        return moves * self.move_scale + self.move_mean + self._here(low_dim)
 
     def _here(self, low_dim: Tensor) -> Tensor:
         return low_dim[:, None, : self.shape.actions]
+
+
+def _waves(time: Tensor) -> Tensor:
+    """Tell times (n,) by the hands of clocks, (n, 2 P): one for each of P periods."""
+    angles = 2 * math.pi * time[:, None] / PERIODS
+    return torch.cat([angles.sin(), angles.cos()], dim=1)
 
 
 def _linear(inputs: int, outputs: int, random: torch.Generator) -> nn.Linear:

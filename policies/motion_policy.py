@@ -1,4 +1,4 @@
-"""A policy over joint targets: state and style -> overlapping chunks -> one target per step.
+"""A policy over joint targets: state, style and time -> overlapping chunks -> one target a step.
 
 At every control step the network says where the joints go during the next H; what is done is the
 mean of all that was said about this step (temporal ensembling of Zhao et al., RSS 2023, section
@@ -14,6 +14,9 @@ from policies.base import Observation, ObservationSpec, RecurrentState
 from policies.chunk_network import ChunkNetwork
 from policies.motions import seen_numbers
 from policies.networks import one_thread
+
+ONE_STEP = np.array([0.0, 1.0])
+"""How style and time change from one control step to the next."""
 
 
 class MotionPolicy:
@@ -48,21 +51,20 @@ class MotionPolicy:
     ) -> tuple[NDArray[np.float64], RecurrentState | None]:
         """Return joint targets [rad; m for grippers], (J,) for one observation, (n, J) for n.
 
-        The memory after it is what was said of the next steps: styles (n, 1), sums of targets
-        (n, H, J) and how many were summed (n, H, 1). A style is chosen where an episode starts: the
-        typical one, or one drawn by the weights of the demonstrations.
+        The memory after it has style and time (n, 2), and what was said of the next steps: sums of
+        targets (n, H, J) and how many were summed (n, H, 1). A style is chosen where an episode
+        starts: the typical one, or one drawn by the weights of the demonstrations.
         """
         seen = seen_numbers(observation, self.spec)
         single = seen.ndim == 1
         seen = np.atleast_2d(seen)
-        styles, sums, counts = self._remembered(len(seen), state, episode_start, deterministic)
+        course, sums, counts = self._remembered(len(seen), state, episode_start, deterministic)
         with torch.inference_mode(), one_thread():
-            chunks = self.network(
-                torch.from_numpy(seen), torch.from_numpy(styles[:, 0].astype(int))
-            )
+            style, time = torch.from_numpy(course.astype(np.int64)).T
+            chunks = self.network(torch.from_numpy(seen), style, time)
         sums, counts = sums + chunks.numpy(), counts + 1
         targets = sums[:, 0] / counts[:, 0]
-        return (targets[0] if single else targets), (styles, _next(sums), _next(counts))
+        return (targets[0] if single else targets), (course + ONE_STEP, _next(sums), _next(counts))
 
     def _remembered(
         self,
@@ -71,17 +73,16 @@ class MotionPolicy:
         episode_start: NDArray[np.bool_] | None,
         deterministic: bool,
     ) -> tuple[NDArray[np.float64], ...]:
-        """Return the memory of `count` episodes, empty and with a style where one starts."""
+        """Return the memory of `count` episodes, new and with a style where one starts."""
         shape = self.network.shape
-        sizes = ((1,), (shape.chunk, shape.actions), (shape.chunk, 1))
+        sizes = ((2,), (shape.chunk, shape.actions), (shape.chunk, 1))
         fresh = np.ones(count, dtype=np.bool_)
         memory = tuple(np.zeros((count, *size)) for size in sizes)
         if state is not None:
             fresh = np.zeros_like(fresh) if episode_start is None else np.asarray(episode_start)
             kept = zip(state, memory, strict=True)
             memory = tuple(np.where(_wide(fresh, old), new, old) for old, new in kept)
-        styles = memory[0]
-        styles[fresh, 0] = self.typical if deterministic else self._drawn(int(fresh.sum()))
+        memory[0][fresh, 0] = self.typical if deterministic else self._drawn(int(fresh.sum()))
         return memory
 
     def _drawn(self, count: int) -> NDArray[np.int64]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from policies.bc_chunk import Motions
-from tests.policies.learning import make
+from tests.policies.learning import make, replay
 
 MOTIONS = Motions(
     np.arange(7, dtype=np.float32)[:, None],
@@ -60,7 +60,7 @@ def test_sampled_styles_are_drawn_by_weight_and_kept_for_the_episode(policy, mot
     drawn = np.bincount(state[0][:, 0].astype(int), minlength=5) / 3000
     np.testing.assert_allclose(drawn, policy.network.chances, atol=0.03)
     _, after = policy.predict(seen, state, np.zeros(3000, dtype=bool))
-    np.testing.assert_array_equal(after[0], state[0])
+    np.testing.assert_array_equal(after[0][:, 0], state[0][:, 0])
 
 
 def test_a_target_is_the_mean_of_all_that_was_said_about_it(policy, motions):
@@ -68,7 +68,10 @@ def test_a_target_is_the_mean_of_all_that_was_said_about_it(policy, motions):
     second, _ = policy.predict(
         observe(motions.low_dim[1]), state, np.zeros(1, dtype=bool), deterministic=True
     )
-    alone, told = policy.predict(observe(motions.low_dim[1]), deterministic=True)
+    silent = (state[0], np.zeros_like(state[1]), np.zeros_like(state[2]))
+    alone, told = policy.predict(
+        observe(motions.low_dim[1]), silent, np.zeros(1, dtype=bool), deterministic=True
+    )
     said_before = state[1][0, 0]  # by the first chunk about the second step
     np.testing.assert_allclose(second, (said_before + alone) / 2, rtol=1e-6)
     assert state[1].shape == (1, 3, 2)
@@ -87,6 +90,16 @@ def test_a_batch_is_a_loop_and_an_episode_that_starts_forgets(policy, motions):
     fresh, _ = policy.predict(observe(rows), deterministic=True)
     np.testing.assert_allclose(again[0], fresh[0], rtol=1e-6)
     assert np.abs(again[1] - fresh[1]).max() > 1e-3
+
+
+def test_where_nothing_moves_the_time_decides(motions):
+    """The joints rest while a gripper would close: only the time tells the steps apart."""
+    still = replace(motions, low_dim=np.zeros_like(motions.low_dim))
+    same = replace(still, targets=np.tile(motions.targets[:6], (5, 1)))
+    policy = make("bc-chunk", steps=300).fit(same, np.ones(5)).policy_
+    found = replay(policy, same)
+    assert np.abs(found - same.targets).max() < 0.3
+    assert np.ptp(found[:6], axis=0).min() > 1
 
 
 def test_what_the_demonstrations_differ_in_is_their_style(motions):
