@@ -36,9 +36,9 @@ class BCChunkConfig:
     """Z, numbers that tell the style of a demonstration."""
     hidden: int = 384
     """Width of the hidden layers."""
-    noise: float = 0.04
+    noise: float = 0.02
     """Largest deviation of the input noise [spreads of the number in the pool]."""
-    steps: int = 3000
+    steps: int = 4500
     """Gradient steps."""
     batch: int = 256
     """Chunks per gradient step."""
