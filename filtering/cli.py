@@ -44,13 +44,16 @@ class FilterArguments:
     the score norm."""
     camera: tuple[str, ...] = field(default=())
     """Cameras whose pictures are used; the main one if none is named."""
+    effects: bool = True
+    """Look at the video before and after each segment, in all cameras unless some are named: a step
+    of which nothing came is as bad as one left out. Of the score norm."""
     frames_per_segment: int = 64
-    """Most frames looked at in a segment."""
+    """Most frames looked at in a segment. Of the score equation3."""
     background: str = "median"
-    """Background subtraction: none, median or mog2."""
+    """Background subtraction: none, median or mog2. Of the score equation3."""
     features: str = "pooled"
-    """What describes a segment: pooled (nothing is learned), or the folder of a segmenter that
-    `teasim segment fit --features` made."""
+    """What describes a segment for equation3: pooled (nothing is learned), or the folder of a
+    segmenter that `teasim segment fit --features` made."""
     fps: float | None = None
     """Frames (lines) per second of an MS-TCN folder; times are told in frames if not given."""
     max_flagged: float = 1.0
@@ -171,6 +174,7 @@ def run(arguments: FilterArguments) -> int:
         frames_per_segment=arguments.frames_per_segment,
         background=arguments.background,
         features=arguments.features,
+        effects=arguments.effects,
     )
     pool = open_source(arguments.source, arguments.fps)
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from filtering.findings import Findings, Places, find_departures, find_surprises
 from filtering.sequence import transitions
 from filtering.thresholds import Grouping, group_weights
-from filtering.weights.norm_score import near_and_far, score_steps
+from filtering.weights.norm_score import NormScore, near_and_far, score_steps
 from filtering.weights.precedence import Pairs, precedence_graph
 from filtering.weights.problem import Problem
 from filtering.weights.score import score
@@ -30,6 +30,8 @@ SMALLEST_CUT = 2.0
 """Losses up to this are never flagged on their own [nats]."""
 CUT_SHARE = 2 / 3
 """Where between the two clusters' means of sqrt(l) the cut lies."""
+IDLE_DOUBT = 1.0
+"""Log-odds against a step in vain before it is looked at [nats]."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,12 @@ class Evidence:
     """Names of the T sub-task labels."""
     segments: tuple[tuple[Span, ...], ...]
     """Per demonstration its q segments."""
-    states: Sequence[Array]
-    """Per demonstration (q, N): what each segment looks like, rows of mean squared length 1."""
+    states: Sequence[Array] = ()
+    """Per demonstration (q, N): what each segment looks like, rows of mean squared length 1; empty
+    where the score does not ask."""
+    idle: Sequence[Array] | None = None
+    """Per demonstration (q,): how surprising it is that so little came of each segment [nats]; None
+    where nobody looked."""
 
     @cached_property
     def labels(self) -> list[list[int]]:
@@ -104,15 +110,30 @@ def by_norm(evidence: Evidence, rule: Rule) -> Verdict:
     if rule.precedence:
         counts = counts.restricted(precedence_graph(rule.precedence, evidence.subtasks))
     found = score_steps(counts, tolerance=rule.tolerance)
-    losses = found.losses
+    vain = in_vain(found, evidence)
+    losses = found.losses + np.array([nats.max(initial=0.0) for nats in vain])
     cut = cut_of(losses)
     weights = 1 / (1 + (losses / cut) ** 2)  # one half at the cut
     flagged = losses > cut
     grouping = Grouping(flagged.astype(np.int64), 0.5 * flagged.any())
     if (rule.groups, rule.threshold) != ("auto", "auto"):
         grouping = group_weights(weights, rule.groups, _method(rule))
-    findings = find_departures(found, evidence.labels, evidence.places)
+    findings = find_departures(found, evidence.labels, evidence.places, vain)
     return Verdict(losses, weights, grouping, found.trust, findings)
+
+
+def in_vain(found: NormScore, evidence: Evidence) -> list[Array]:
+    """Return per demonstration (q,): what each segment adds of which nothing came [nats].
+
+    A step in vain is at most as bad as one left out; and because few steps are in vain, IDLE_DOUBT
+    nats of evidence are needed before one counts. Only the worst segment counts for the loss.
+    """
+    if evidence.idle is None:
+        return [np.zeros(len(labels)) for labels in evidence.labels]
+    return [
+        np.clip(nats - IDLE_DOUBT, 0.0, usual[labels])
+        for nats, usual, labels in zip(evidence.idle, found.usual, evidence.labels, strict=True)
+    ]
 
 
 def by_equation_3(evidence: Evidence, rule: Rule) -> Verdict:

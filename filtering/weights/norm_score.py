@@ -48,6 +48,8 @@ class NormScore:
     """(D,) l_d [nats], higher is worse."""
     trust: Array
     """(D,) w: how much each demonstration shapes the norm, in [0, 1]."""
+    usual: Array
+    """(D, T) max(0, z_a): what leaving a sub-task out would add [nats]."""
     omitted: Array
     """(D, T) what each left-out sub-task adds [nats]."""
     misplaced: Array
@@ -91,7 +93,8 @@ def score_steps(counts: StepCounts, seed: int = 0, tolerance: float = 0.0) -> No
 
 
 def _score(counts: StepCounts, trust: Array) -> NormScore:
-    omitted = (1 - counts.occurs) * np.maximum(_log_odds(counts.occurs, 1.0, trust), 0)
+    usual = np.maximum(_log_odds(counts.occurs, 1.0, trust), 0)
+    omitted = (1 - counts.occurs) * usual
     order = np.maximum(_log_odds(counts.before, counts.both, trust), 0) * counts.binding
     misplaced = order * (1 - counts.before) * counts.both
     broken = misplaced.reshape(counts.n_demos, -1)
@@ -101,6 +104,7 @@ def _score(counts: StepCounts, trust: Array) -> NormScore:
     return NormScore(
         losses=omitted.sum(axis=1) + precedence + TRANSITION * transition,
         trust=trust,
+        usual=usual,
         omitted=omitted,
         misplaced=misplaced,
         precedence=precedence,
