@@ -1,6 +1,6 @@
 """From a score to weights and groups: the two ways of judging a pool, behind one form.
 
-* `norm`, the default: the losses of `norm_score`. The cut lies two thirds of the way from the mean
+* `norm`, the default: the losses of `norm_score`. The cut lies seven tenths of the way from the mean
   of the lower to the mean of the upper cluster of sqrt(l), and never below SMALLEST_CUT: what costs
   less than that is variety. Below it nothing is flagged, which is how a clean pool stays clean.
 * `equation3`: the paper's conditional next-step model, trimmed, and k-means on its weights.
@@ -28,7 +28,7 @@ from teasim.pool import Span
 
 SMALLEST_CUT = 2.0
 """Losses up to this are never flagged on their own [nats]."""
-CUT_SHARE = 2 / 3
+CUT_SHARE = 0.7
 """Where between the two clusters' means of sqrt(l) the cut lies."""
 IDLE_DOUBT = 1.0
 """Log-odds against a step in vain before it is looked at [nats]."""

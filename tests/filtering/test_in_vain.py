@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filtering.demo_filter import FilterConfig
-from filtering.explain import explain
+from filtering.explain import Clock, explain
+from filtering.report.layout import Mark
+from filtering.report.views import marks_of
 from filtering.verdict import IDLE_DOUBT, Evidence, Verdict, by_norm, in_vain
 from filtering.weights.norm_score import score_steps
 from teasim.pool import Span
@@ -69,3 +71,8 @@ def test_a_step_in_vain_is_never_worse_than_one_left_out(idle: list[list[float]]
 def test_the_loss_grows_by_the_worst_step_in_vain() -> None:
     without, losses = judged(None).losses, judged([[0.0] * 4] * 7 + [[1.5, 0.0, 2.5, 0.0]]).losses
     assert losses[-1] - without[-1] == pytest.approx(2.5 - IDLE_DOUBT, abs=1e-9)
+
+
+def test_the_timeline_says_that_nothing_came_of_it() -> None:
+    verdict = judged([[0.0] * 4] * 7 + [[0.0, 0.0, 9.0, 0.0]])
+    assert marks_of(verdict.findings[-1], Clock(10.0)) == (Mark(2.0, "nothing came of c"),)
