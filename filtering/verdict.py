@@ -1,9 +1,9 @@
 """From a score to weights and groups: the two ways of judging a pool, behind one form.
 
-* `norm`, the default: the losses of `norm_score`, and what steps add of which nothing came. The cut
-  lies seven tenths of the way from the mean of the lower to the mean of the upper cluster of sqrt(l),
-  and never below SMALLEST_CUT: what costs less than that is variety. Below it nothing is flagged,
-  which is how a clean pool stays clean.
+* `norm`, the default: the losses of `norm_score`, and what steps add of which nothing came. The
+  cut lies seven tenths of the way from the mean of the lower to the mean of the upper cluster of
+  sqrt(l), and never below SMALLEST_CUT: what costs less than that is variety. Below it nothing is
+  flagged, which is how a clean pool stays clean.
 * `equation3`: the paper's conditional next-step model, trimmed, and k-means on its weights.
 """
 
