@@ -153,7 +153,7 @@ def run(arguments: FilterArguments) -> int:
     Raises:
         TeasimError: the pool is damaged, or an argument is out of range.
     """
-    from filtering.demo_filter import DemoFilter, FilterConfig
+    from filtering.demo_filter import DemoFilter, FilterConfig, caution
     from filtering.output import check_output, write_filter_output
     from filtering.segmentation.sequence_pool import SequencePool, open_source
     from filtering.weights.precedence import read_precedence
@@ -191,6 +191,9 @@ def run(arguments: FilterArguments) -> int:
             print(f"{name}  weight {row.weight:.2f}  {row.reason}")
     share = float(fitted.flagged_.mean())
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
+    warning = caution(len(fitted.weights_))
+    if warning is not None:
+        print(warning)
     print(f"report: {arguments.out / 'report.html'}")
     return 1 if share > arguments.max_flagged else 0
 

@@ -31,6 +31,8 @@ from teasim.pool.weight_table import WeightRow
 
 FEWEST_DEMOS = 3
 """With fewer demonstrations there is no majority to agree with."""
+FEW_DEMOS = 4
+"""With so few or fewer, what can be said of them has a limit that is told: `caution`."""
 ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features")
 """Settings that mean nothing for step lists."""
 
@@ -119,6 +121,19 @@ class FilterConfig:
             )
         if not self.ridge > 0.0:
             raise ConfigError(f"ridge is {self.ridge}; choose a number above 0.")
+
+
+def caution(count: int) -> str | None:
+    """Return what cannot be said of a pool of `count` demonstrations, None if it is large enough.
+
+    The score `norm` leaves even one missing step of one in three unflagged.
+    """
+    if count > FEW_DEMOS:
+        return None
+    return (
+        f"With {count} demonstrations a majority is {count // 2 + 1}: a mistake that 2 of them "
+        "share cannot be told from what is usual, and even that of a single one may not be flagged."
+    )
 
 
 class DemoFilter:
