@@ -121,7 +121,7 @@ def _transitions(demos: Sequence[StepList], n_subtasks: int) -> Array:
     """Return (D, T + 1, T + 1): how often the column's sub-task comes right after the row's."""
     follows = np.zeros((len(demos), n_subtasks + 1, n_subtasks + 1))
     owners = np.repeat(np.arange(len(demos)), [len(demo.labels) + 1 for demo in demos])
-    sources = [label for demo in demos for label in (n_subtasks, *demo.labels)]
-    targets = [label for demo in demos for label in (*demo.labels, n_subtasks)]
+    sources = np.array([label for demo in demos for label in (n_subtasks, *demo.labels)])
+    targets = np.array([label for demo in demos for label in (*demo.labels, n_subtasks)])
     np.add.at(follows, (owners, sources, targets), 1.0)
     return follows
