@@ -101,14 +101,19 @@ class FilterConfig:
                 f"Unknown threshold '{self.threshold}'; choose auto, {', '.join(METHODS)}."
             )
         self._check_numbers()
-        if self.score != "norm" and (self.precedence or self.tolerance):
-            raise ConfigError(
-                f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
-            )
+        self._check_score()
 
     def rule(self) -> Rule:
         """Return the settings by which evidence is judged."""
         return Rule(**{one.name: getattr(self, one.name) for one in fields(Rule)})
+
+    def _check_score(self) -> None:
+        if self.score != "norm" and (self.precedence or self.tolerance):
+            raise ConfigError(
+                f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
+            )
+        if self.score != "equation3" and self.features != POOLED:
+            raise ConfigError(f"The score '{self.score}' takes no features; choose equation3.")
 
     def _check_numbers(self) -> None:
         if not 0.0 <= self.tolerance < 1.0:
