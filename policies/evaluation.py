@@ -126,7 +126,7 @@ def score(mode: str, episodes: Sequence[Episode], subtasks: Sequence[str]) -> Sc
     return Scores(
         mode,
         tuple(episodes),
-        grouped_rate([(sum(a.correct for a in e.actions), len(e.actions)) for e in episodes]),
+        grouped_rate([(e.n_correct, len(e.actions)) for e in episodes]),
         grouped_rate([(sum(a.allowed for a in e.actions), len(e.actions)) for e in episodes]),
         rate(sum(episode.success for episode in episodes), count),
         rate(sum(episode.unsafe for episode in episodes), count),

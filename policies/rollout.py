@@ -62,6 +62,11 @@ class Episode:
     violations: tuple[str, ...]
     """Rules that were broken."""
 
+    @property
+    def n_correct(self) -> int:
+        """How many of the executed actions are the reference's."""
+        return sum(action.correct for action in self.actions)
+
 
 def make_environment(
     config: EnvironmentConfig, spec: ObservationSpec, *, filmed: bool = False

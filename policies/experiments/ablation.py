@@ -169,10 +169,7 @@ def _hits(found: list[Scores]) -> list[tuple[int, int]]:
     """Correct and all actions per scene, over the training seeds: a scene is what is paired."""
     scenes = zip(*(s.episodes for s in found), strict=True)
     return [
-        (
-            sum(action.correct for episode in scene for action in episode.actions),
-            sum(len(episode.actions) for episode in scene),
-        )
+        (sum(episode.n_correct for episode in scene), sum(len(e.actions) for e in scene))
         for scene in scenes
     ]
 
