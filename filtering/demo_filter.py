@@ -156,7 +156,8 @@ class DemoFilter:
         trust_ (D,): how much it shapes what is usual, in [0, 1]; w of equation 3 sums to M.
         objective_: value of equation 3 [nats per step]; None for another score.
         segments_: the segments used.
-        cameras_: the cameras used.
+        cameras_: those whose pictures show segments and states; effects are looked at in all
+            cameras of the pool unless some are named.
         timings_: seconds per stage.
     """
 
