@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from teasim.errors import ConfigError
+from teasim.errors import ConfigError, named
 
 GROUPS = ("auto", "1", "2", "3")
 """What may be asked for."""
@@ -159,9 +159,7 @@ def method_named(name: str) -> Grouper:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in METHODS:
-        raise ConfigError(f"Unknown threshold '{name}'; choose {', '.join(METHODS)}.")
-    return METHODS[name]
+    return named("threshold", METHODS, name)
 
 
 def probability_incorrect(losses: NDArray[np.float64]) -> NDArray[np.float64]:

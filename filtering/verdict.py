@@ -24,7 +24,7 @@ from filtering.weights.problem import Problem
 from filtering.weights.score import score
 from filtering.weights.solvers import solver_named
 from filtering.weights.steps import Array, StepCounts, StepList, count_steps
-from teasim.errors import ConfigError
+from teasim.errors import named
 from teasim.pool import Span
 
 SMALLEST_CUT = 2.0
@@ -176,6 +176,4 @@ def judge_named(name: str) -> Judge:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in JUDGES:
-        raise ConfigError(f"Unknown score '{name}'; choose {', '.join(JUDGES)}.")
-    return JUDGES[name]
+    return named("score", JUDGES, name)

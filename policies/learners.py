@@ -14,7 +14,7 @@ from policies.bcnd import BCND, BCNDConfig
 from policies.demodice import DemoDICE, DemoDICEConfig
 from policies.r_maxent import RMaxEnt, RMaxEntConfig
 from policies.subtask_policy import SubtaskPolicy
-from teasim.errors import ConfigError
+from teasim.errors import ConfigError, named
 
 
 class Learner(Protocol):
@@ -66,9 +66,7 @@ def find_learner(name: str, level: str) -> LearnerKind:
     Raises:
         ConfigError: no such learner, or not at that level.
     """
-    if name not in LEARNERS:
-        raise ConfigError(f"Unknown learner '{name}'; choose {', '.join(LEARNERS)}.")
-    kind = LEARNERS[name]
+    kind = named("learner", LEARNERS, name)
     if level not in kind.levels:
         raise ConfigError(
             f"The learner '{name}' has no level '{level}'; choose {', '.join(kind.levels)}."
