@@ -4,7 +4,7 @@ Nothing heavy is imported before a verb's options were understood.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -129,8 +129,7 @@ def evaluate(argv: Sequence[str]) -> int:
     options = tyro.cli(EvaluateOptions, args=list(argv), prog="teasim evaluate")
     from policies.checkpoint import load_policy
     from policies.comparison import compare, comparison_json, comparison_text
-    from policies.evaluation import EvaluationConfig
-    from policies.evaluation import evaluate as try_policy
+    from policies.evaluation import EvaluationConfig, evaluate_all
     from policies.outputs import check_file
     from policies.results import Bar, summary, write_junit, write_scores
     from policies.rollout import EnvironmentConfig
@@ -143,13 +142,12 @@ def evaluate(argv: Sequence[str]) -> int:
     )
     config = EvaluationConfig(options.episodes, options.seed, world, options.video)
     policy = load_policy(options.run)
-    other = None if options.against is None else load_policy(options.against)
-    scores = try_policy(policy, config, jobs=options.jobs)
+    rivals = [] if options.against is None else [load_policy(options.against)]
+    scores, *others = evaluate_all([policy, *rivals], config, jobs=options.jobs)
     about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
     print(summary(scores))
-    if other is not None:
-        rival = try_policy(other, replace(config, video=None), jobs=options.jobs)
-        found = compare(scores, rival)
+    for other in others:
+        found = compare(scores, other)
         about |= {"against": str(options.against), "comparison": comparison_json(found)}
         print(comparison_text(found, str(options.against)))
     if options.json:
