@@ -54,7 +54,8 @@ class FilterConfig:
     """Solver of equation 3: annealed, alternating, exact (24 different demonstrations at most) or
     published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
-    """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
+    """Number of groups: auto (kept, and of the score norm what is out of order and where steps are
+    left out), 1 (nothing is flagged), 2 or 3."""
     threshold: str = "auto"
     """How the threshold is found: auto (the score's own rule), or the mid-points between groups of
     weights by kmeans, gmm or minibatch."""

@@ -1,9 +1,7 @@
 """From a score to weights and groups: the two ways of judging a pool, behind one form.
 
-* `norm`, the default: the losses of `norm_score`, and what steps add of which nothing came. The
-  cut lies seven tenths of the way from the mean of the lower to the mean of the upper cluster of
-  sqrt(l), and never below SMALLEST_CUT: what costs less than that is variety. Below it nothing is
-  flagged, which is how a clean pool stays clean.
+* `norm`, the default: the losses of `norm_score`, and what steps add of which nothing came; cut and
+  grouped by `decision`.
 * `equation3`: the paper's conditional next-step model, trimmed, and k-means on its weights.
 """
 
@@ -13,12 +11,12 @@ from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from filtering.decision import decide
 from filtering.findings import Findings, Places, find_departures, find_surprises
 from filtering.sequence import transitions
 from filtering.thresholds import Grouping, group_weights
-from filtering.weights.norm_score import NormScore, near_and_far, score_steps
+from filtering.weights.norm_score import NormScore, score_steps
 from filtering.weights.precedence import Pairs, precedence_graph
 from filtering.weights.problem import Problem
 from filtering.weights.score import score
@@ -27,10 +25,6 @@ from filtering.weights.steps import Array, StepCounts, StepList, count_steps
 from teasim.errors import named
 from teasim.pool import Span
 
-SMALLEST_CUT = 2.0
-"""Losses up to this are never flagged on their own [nats]."""
-CUT_SHARE = 0.7
-"""Where between the two clusters' means of sqrt(l) the cut lies."""
 IDLE_DOUBT = 1.0
 """Log-odds against a step in vain before it is looked at [nats]."""
 
@@ -110,17 +104,16 @@ def by_norm(evidence: Evidence, rule: Rule) -> Verdict:
     counts = evidence.counts
     if rule.precedence:
         counts = counts.restricted(precedence_graph(rule.precedence, evidence.subtasks))
-    found = score_steps(counts, tolerance=rule.tolerance)
+    found = score_steps(counts, tolerance=rule.tolerance, n_groups=3 if rule.groups == "3" else 2)
     vain = in_vain(found, evidence)
-    losses = found.losses + np.array([nats.max(initial=0.0) for nats in vain])
-    cut = cut_of(losses)
-    weights = 1 / (1 + (losses / cut) ** 2)  # one half at the cut
-    flagged = losses > cut
-    grouping = Grouping(flagged.astype(np.int64), 0.5 * flagged.any())
-    if (rule.groups, rule.threshold) != ("auto", "auto"):
-        grouping = group_weights(weights, rule.groups, _method(rule))
+    worst_vain = np.array([nats.max(initial=0.0) for nats in vain])
+    losses = found.losses + worst_vain
+    decision = decide(losses, found.left_out + worst_vain > found.out_of_order, rule.groups)
+    grouping = decision.grouping
+    if rule.threshold != "auto":
+        grouping = group_weights(decision.weights, rule.groups, rule.threshold)
     findings = find_departures(found, evidence.labels, evidence.places, vain)
-    return Verdict(losses, weights, grouping, found.trust, findings)
+    return Verdict(losses, decision.weights, grouping, found.trust, findings)
 
 
 def in_vain(found: NormScore, evidence: Evidence) -> list[Array]:
@@ -155,15 +148,6 @@ def by_equation_3(evidence: Evidence, rule: Rule) -> Verdict:
 
 def _method(rule: Rule) -> str:
     return "kmeans" if rule.threshold == "auto" else rule.threshold
-
-
-def cut_of(losses: NDArray[np.float64]) -> float:
-    """Loss above which a demonstration is flagged [nats], for losses (D,)."""
-    low, high = near_and_far(losses)
-    if not len(high):
-        return SMALLEST_CUT
-    between = low.mean() + CUT_SHARE * (high.mean() - low.mean())
-    return max(float(between) ** 2, SMALLEST_CUT)
 
 
 JUDGES: Mapping[str, Judge] = MappingProxyType({"norm": by_norm, "equation3": by_equation_3})
