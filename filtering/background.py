@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from filtering.frames import Frames
-from teasim.errors import ConfigError
+from teasim.errors import named
 
 GREY = 127
 """Value of a background pixel; the backbone's input is (x - 127) / 128."""
@@ -76,8 +76,4 @@ def subtraction_named(name: str) -> Subtraction:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in BACKGROUNDS:
-        raise ConfigError(
-            f"Unknown background subtraction '{name}'; choose {', '.join(BACKGROUNDS)}."
-        )
-    return BACKGROUNDS[name]
+    return named("background subtraction", BACKGROUNDS, name)

@@ -33,7 +33,8 @@ class FilterArguments:
     """Solver of equation 3: annealed, alternating, exact (24 different demonstrations at most) or
     published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
-    """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
+    """Number of groups: auto (kept, and of the score norm what is out of order and where steps are
+    left out), 1 (nothing is flagged), 2 or 3."""
     threshold: str = "auto"
     """How the threshold is found: auto (the score's own rule), or the mid-points between groups of
     weights by kmeans, gmm or minibatch."""
@@ -44,13 +45,16 @@ class FilterArguments:
     the score norm."""
     camera: tuple[str, ...] = field(default=())
     """Cameras whose pictures are used; the main one if none is named."""
+    effects: bool = True
+    """Look at the video before and after each segment, in all cameras unless some are named: a step
+    of which nothing came is as bad as one left out. Of the score norm."""
     frames_per_segment: int = 64
-    """Most frames looked at in a segment."""
+    """Most frames looked at in a segment. Of the score equation3."""
     background: str = "median"
-    """Background subtraction: none, median or mog2."""
+    """Background subtraction: none, median or mog2. Of the score equation3."""
     features: str = "pooled"
-    """What describes a segment: pooled (nothing is learned), or the folder of a segmenter that
-    `teasim segment fit --features` made."""
+    """What describes a segment for equation3: pooled (nothing is learned), or the folder of a
+    segmenter that `teasim segment fit --features` made."""
     fps: float | None = None
     """Frames (lines) per second of an MS-TCN folder; times are told in frames if not given."""
     max_flagged: float = 1.0
@@ -150,7 +154,7 @@ def run(arguments: FilterArguments) -> int:
     Raises:
         TeasimError: the pool is damaged, or an argument is out of range.
     """
-    from filtering.demo_filter import DemoFilter, FilterConfig
+    from filtering.demo_filter import DemoFilter, FilterConfig, caution
     from filtering.output import check_output, write_filter_output
     from filtering.segmentation.sequence_pool import SequencePool, open_source
     from filtering.weights.precedence import read_precedence
@@ -171,6 +175,7 @@ def run(arguments: FilterArguments) -> int:
         frames_per_segment=arguments.frames_per_segment,
         background=arguments.background,
         features=arguments.features,
+        effects=arguments.effects,
     )
     pool = open_source(arguments.source, arguments.fps)
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)
@@ -187,6 +192,9 @@ def run(arguments: FilterArguments) -> int:
             print(f"{name}  weight {row.weight:.2f}  {row.reason}")
     share = float(fitted.flagged_.mean())
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
+    warning = caution(len(fitted.weights_))
+    if warning is not None:
+        print(warning)
     print(f"report: {arguments.out / 'report.html'}")
     return 1 if share > arguments.max_flagged else 0
 

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.background import subtraction_named
+from filtering.effects.rests import changes, look_at_rests
+from filtering.effects.surprise import effect_surprises
 from filtering.explain import Finding, explain
 from filtering.features.description import POOLED, check_description, describe_segments
 from filtering.features.reduction import reduce_features
+from filtering.frame_features import FrameSource
 from filtering.frames import chosen_cameras, main_camera
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
@@ -28,6 +31,8 @@ from teasim.pool.weight_table import WeightRow
 
 FEWEST_DEMOS = 3
 """With fewer demonstrations there is no majority to agree with."""
+FEW_DEMOS = 4
+"""With so few or fewer, what can be said of them has a limit that is told: `caution`."""
 ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features")
 """Settings that mean nothing for step lists."""
 
@@ -49,7 +54,8 @@ class FilterConfig:
     """Solver of equation 3: annealed, alternating, exact (24 different demonstrations at most) or
     published (SciPy's SLSQP without a ridge)."""
     groups: str = "auto"
-    """Number of groups: auto, 1 (nothing is flagged), 2 or 3."""
+    """Number of groups: auto (kept, and of the score norm what is out of order and where steps are
+    left out), 1 (nothing is flagged), 2 or 3."""
     threshold: str = "auto"
     """How the threshold is found: auto (the score's own rule), or the mid-points between groups of
     weights by kmeans, gmm or minibatch."""
@@ -60,13 +66,17 @@ class FilterConfig:
     the score norm."""
     cameras: tuple[str, ...] = ()
     """Cameras whose pictures are used; empty means the main one."""
+    effects: bool = True
+    """Look at the video before and after each segment, in all cameras unless some are named: a step
+    of which nothing came is as bad as one left out. Of the score norm."""
     frames_per_segment: int = 64
-    """Most frames looked at in a segment (paper section 3.2)."""
+    """Most frames looked at in a segment (paper section 3.2). Of the score equation3."""
     background: str = "median"
-    """Background subtraction: none, median or mog2."""
+    """Background subtraction: none, median or mog2. Of the score equation3."""
     features: str = POOLED
-    """What describes a segment: pooled (nothing is learned), or the folder of a segmenter that was
-    fitted with features (they keep to the camera, frames and background they were learned from)."""
+    """What describes a segment for equation3: pooled (nothing is learned), or the folder of a
+    segmenter that was fitted with features (they keep to the camera, frames and background they
+    were learned from)."""
     trusted_share: float = 0.5
     """M / D, share of demonstrations that equation 3 trusts."""
     ridge: float = 0.01
@@ -92,10 +102,19 @@ class FilterConfig:
                 f"Unknown threshold '{self.threshold}'; choose auto, {', '.join(METHODS)}."
             )
         self._check_numbers()
+        self._check_score()
+
+    def rule(self) -> Rule:
+        """Return the settings by which evidence is judged."""
+        return Rule(**{one.name: getattr(self, one.name) for one in fields(Rule)})
+
+    def _check_score(self) -> None:
         if self.score != "norm" and (self.precedence or self.tolerance):
             raise ConfigError(
                 f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
             )
+        if self.score != "equation3" and self.features != POOLED:
+            raise ConfigError(f"The score '{self.score}' takes no features; choose equation3.")
 
     def _check_numbers(self) -> None:
         if not 0.0 <= self.tolerance < 1.0:
@@ -108,6 +127,19 @@ class FilterConfig:
             )
         if not self.ridge > 0.0:
             raise ConfigError(f"ridge is {self.ridge}; choose a number above 0.")
+
+
+def caution(count: int) -> str | None:
+    """Return what cannot be said of a pool of `count` demonstrations, None if it is large enough.
+
+    The score `norm` leaves even one missing step of one in three unflagged.
+    """
+    if count > FEW_DEMOS:
+        return None
+    return (
+        f"With {count} demonstrations a majority is {count // 2 + 1}: a mistake that 2 of them "
+        "share cannot be told from what is usual, and even that of a single one may not be flagged."
+    )
 
 
 class DemoFilter:
@@ -125,7 +157,8 @@ class DemoFilter:
         trust_ (D,): how much it shapes what is usual, in [0, 1]; w of equation 3 sums to M.
         objective_: value of equation 3 [nats per step]; None for another score.
         segments_: the segments used.
-        cameras_: the cameras used.
+        cameras_: those whose pictures show segments and states; effects are looked at in all
+            cameras of the pool unless some are named.
         timings_: seconds per stage.
     """
 
@@ -165,11 +198,10 @@ class DemoFilter:
         with self._timed("segments"):
             self.segments_ = self._segments(pool, jobs)
         with self._timed("features"):
-            states = self._states(pool, jobs)
+            evidence = self._evidence(pool, jobs)
         # The matrices are small: more BLAS threads only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
-            evidence = Evidence(self.segments_.subtasks, self.segments_.spans, states)
-            self._learn(judge_named(self.config.score)(evidence, self._rule()))
+            self._learn(judge_named(self.config.score)(evidence, self.config.rule()))
         self.reasons_ = tuple(
             explain(found, pool.fps) if flagged else ""
             for found, flagged in zip(self.findings_, self.flagged_, strict=True)
@@ -222,6 +254,21 @@ class DemoFilter:
         segmenter = segmenter_named(self.config.segmenter, self.config.subtasks, self.cameras_)
         return segmenter(pool, jobs=jobs)
 
+    def _evidence(self, pool: Source, jobs: int) -> Evidence:
+        """Return what the score asks for; looking at pictures is what takes time."""
+        known = Evidence(self.segments_.subtasks, self.segments_.spans)
+        if self.config.score == "equation3":
+            return replace(known, states=self._states(pool, jobs))
+        if self.config.effects and isinstance(pool, Pool):
+            return replace(known, idle=self._idle(pool, known, jobs))
+        return known
+
+    def _idle(self, pool: Pool, known: Evidence, jobs: int) -> list[NDArray[np.float64]]:
+        """Return per demonstration (q,): surprise that so little came of each segment [nats]."""
+        source = FrameSource(self.config.cameras or pool.cameras)
+        rests = look_at_rests(pool.episodes, self.segments_.spans, pool.fps, source, jobs=jobs)
+        return effect_surprises([changes(rest) for rest in rests], known.labels)
+
     def _states(self, pool: Source, jobs: int) -> list[NDArray[np.float64]]:
         """Return per demonstration (q, N): what its segments look like, else which they are."""
         if isinstance(pool, SequencePool):
@@ -237,10 +284,6 @@ class DemoFilter:
             jobs=jobs,
         )
         return reduce_features(features)
-
-    def _rule(self) -> Rule:
-        names = [field.name for field in fields(Rule)]
-        return Rule(**{name: getattr(self.config, name) for name in names})
 
     def _learn(self, verdict: Verdict) -> None:
         self.weights_ = verdict.weights

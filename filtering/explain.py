@@ -54,6 +54,8 @@ class Finding:
     """What it adds to the loss [nats]."""
     came: Span | None = None
     """Where the expected sub-task came instead, later; None where it did not."""
+    idle: Span | None = None
+    """The expected sub-task where it was carried out, but nothing came of it."""
 
 
 def explain(findings: Sequence[Finding], fps: float | None) -> str:
@@ -70,7 +72,10 @@ def explain(findings: Sequence[Finding], fps: float | None) -> str:
         )
     clock = Clock(fps)
     named = findings[0]
-    sentence = f"{_place(named, clock)} {_expectation(named)}, {_sight(named, clock)}"
+    if named.idle is not None:
+        sentence = f"{named.expected} was seen ({clock.during(named.idle)}), but nothing came of it"
+    else:
+        sentence = f"{_place(named, clock)} {_expectation(named)}, {_sight(named, clock)}"
     if named.missing:
         sentence += f"; '{named.expected}' is missing from the whole video"
     elif named.came is not None:

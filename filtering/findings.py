@@ -25,7 +25,10 @@ Order = NDArray[np.float64]
 
 
 def find_departures(
-    score: NormScore, labels: Sequence[Sequence[int]], places: "Places"
+    score: NormScore,
+    labels: Sequence[Sequence[int]],
+    places: "Places",
+    vain: Sequence[NDArray[np.float64]] | None = None,
 ) -> tuple[Findings, ...]:
     """Return per demonstration where it departs from the norm.
 
@@ -33,11 +36,16 @@ def find_departures(
         score: the default score of the pool.
         labels: per demonstration its q sub-task labels, 0..T-1.
         places: its segments and their names.
+        vain: per demonstration (q,) what each segment adds of which nothing came [nats].
     """
     order = usual_order(labels, score.trust, len(places.subtasks))
-    return tuple(
-        _departures(score, demo, list(labels[demo]), order, places) for demo in range(len(labels))
-    )
+    found = []
+    for demo in range(len(labels)):
+        said = _departures(score, demo, list(labels[demo]), order, places)
+        if vain is not None:
+            said += places.idle(demo, vain[demo])
+        found.append(_gravest_first(said))
+    return tuple(found)
 
 
 def find_surprises(
@@ -95,10 +103,26 @@ class Places:
             came=next((s for s in spans[row:] if s.subtask == expected), None),
         )
 
+    def idle(self, demo: int, surprises: NDArray[np.float64]) -> list[Finding]:
+        """Return the segments of which nothing came, for what each of them adds (q,) [nats]."""
+        spans = self.segments[demo]
+        return [
+            Finding(
+                expected=spans[row].subtask,
+                seen=spans[row].subtask,
+                after=spans[row - 1] if row else None,
+                frame=spans[row].start,
+                missing=False,
+                surprise=float(surprises[row]),
+                idle=spans[row],
+            )
+            for row in np.flatnonzero(surprises > 0).tolist()
+        ]
+
 
 def _departures(
     score: NormScore, demo: int, labels: list[int], order: Order, places: Places
-) -> Findings:
+) -> list[Finding]:
     """Join what the blocks of the default score say about the same place."""
     said = [
         *_omissions(score, demo, labels, order),
@@ -106,15 +130,19 @@ def _departures(
     ]
     _add_unusual_step(said, score, demo, labels)
     if not said:
-        return ()
+        return []
     # To be of the other population may have no step of its own: then it is more of the worst.
     worst = max(range(len(said)), key=lambda k: said[k][2])
     row, label, surprise = said[worst]
     rest = float(score.losses[demo]) - sum(each[2] for each in said)
     said[worst] = (row, label, surprise + rest)
-    found = [places.finding(demo, *each) for each in said]
-    found.sort(key=lambda item: (-round(item.surprise, 6), item.frame))
-    return tuple(item for item in found if item.surprise >= NOTABLE) or tuple(found[:1])
+    return [places.finding(demo, *each) for each in said]
+
+
+def _gravest_first(found: Sequence[Finding]) -> Findings:
+    """Return the notable findings, or else the worst one."""
+    ordered = sorted(found, key=lambda item: (-round(item.surprise, 6), item.frame))
+    return tuple(item for item in ordered if item.surprise >= NOTABLE) or tuple(ordered[:1])
 
 
 Said = tuple[int, int, float]

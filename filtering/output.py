@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.demo_filter import DemoFilter
+from filtering.demo_filter import DemoFilter, caution
 from filtering.explain import Clock
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
@@ -121,6 +121,7 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "segmentation": _segmentation_record(fitted, pool),
         "segmentation_confidence": fitted.segments_.confidence(),
         "demonstrations": len(fitted.weights_),
+        "caution": caution(len(fitted.weights_)),
         "flagged": int(fitted.flagged_.sum()),
         "groups": int(fitted.groups_.max()) + 1,
         "threshold": fitted.threshold_,

@@ -1,10 +1,12 @@
-"""Where the weights of the backbone are; apart from it: looking into the cache needs no torch."""
+"""Which backbone it is, and what was fitted to it; apart from it: the cache needs no torch."""
 
 import hashlib
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-from teasim.errors import ConfigError
+from teasim.errors import CheckpointError, ConfigError
+from teasim.pool.checkpoint import CheckpointKind
 
 RECIPE = "efficientnet-lite0 b10 b15 avg max fp32, v1"
 """What is computed from a frame; changes whenever that changes, and with it every cache key."""
@@ -30,6 +32,28 @@ def weights_path() -> Path:
 def weights_digest() -> str:
     """Return the SHA-256 of the weight file; part of every cache key."""
     return hashlib.sha256(weights_path().read_bytes()).hexdigest()
+
+
+def describe_fitted(
+    kind: CheckpointKind, folder: Path, what: str = "features of a frame"
+) -> dict[str, Any]:
+    """Read the description of something that was fitted to what the backbone sees.
+
+    Args:
+        kind: what `folder` is to hold; its description has `feature_recipe` as "features".
+        folder: where it is.
+        what: what it was fitted to, for the message.
+
+    Raises:
+        CheckpointError: it cannot be read, or was fitted to what another program computes.
+    """
+    description = kind.describe(folder)
+    if description.get("features") != feature_recipe():
+        raise CheckpointError(
+            f"'{kind.description_path(folder)}' was fitted to other {what} than this program "
+            f"computes; {kind.remedy}."
+        )
+    return description
 
 
 def feature_recipe() -> list[str]:

@@ -10,13 +10,13 @@ included: in a clean pool nothing is flagged.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from teasim.errors import ConfigError
+from filtering.kmeans import kmeans
+from teasim.errors import ConfigError, named
 
 GROUPS = ("auto", "1", "2", "3")
 """What may be asked for."""
@@ -102,10 +102,7 @@ def _chosen_from_data(weights: NDArray[np.float64], grouper: Grouper) -> Groupin
 
 def _by_kmeans(weights: NDArray[np.float64], count: int) -> Grouping:
     """Return the exact k-means solution; equal weights always share a group."""
-    values, counts = np.unique(weights, return_counts=True)
-    values, counts = values[::-1], counts[::-1]
-    best = _best_cuts(values, counts.astype(np.float64), count)
-    groups = _assign(weights, values, best)
+    groups = kmeans(-weights, count)
     if count == 1:
         return Grouping(groups, 0.0)
     middle = (weights[groups == 0].mean() + weights[groups == 1].mean()) / 2
@@ -159,9 +156,7 @@ def method_named(name: str) -> Grouper:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in METHODS:
-        raise ConfigError(f"Unknown threshold '{name}'; choose {', '.join(METHODS)}.")
-    return METHODS[name]
+    return named("threshold", METHODS, name)
 
 
 def probability_incorrect(losses: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -189,44 +184,6 @@ def probability_incorrect(losses: NDArray[np.float64]) -> NDArray[np.float64]:
     upper = int(two.means_.argmax())
     shares = two.predict_proba(np.sqrt(np.maximum(losses, 0))[:, None])[:, upper]
     return np.asarray(shares * expit((one.bic(roots) - two.bic(roots)) / 2))
-
-
-def _assign(
-    weights: NDArray[np.float64], values: NDArray[np.float64], cuts: tuple[int, ...]
-) -> NDArray[np.int64]:
-    """Return (D,) groups when the falling distinct `values` are cut before these positions."""
-    bounds = values[list(cuts)] if cuts else np.empty(0)
-    below: NDArray[np.bool_] = weights[:, None] <= bounds[None, :]
-    return np.count_nonzero(below, axis=1).astype(np.int64)
-
-
-def _best_cuts(
-    values: NDArray[np.float64], counts: NDArray[np.float64], groups: int
-) -> tuple[int, ...]:
-    """Return where to cut the falling distinct `values` for the least sum of squares within."""
-    centred = values - np.average(values, weights=counts)
-    number, first, second = (
-        np.concatenate([[0.0], np.cumsum(counts * centred**power)]) for power in range(3)
-    )
-
-    def within(start: NDArray[np.int64] | int, stop: NDArray[np.int64] | int) -> Any:
-        size = number[stop] - number[start]
-        return second[stop] - second[start] - (first[stop] - first[start]) ** 2 / size
-
-    n = len(values)
-    if groups == 1:
-        return ()
-    if groups == 2:
-        cuts = np.arange(1, n)
-        return (1 + int(np.argmin(within(0, cuts) + within(cuts, n))),)
-    least, best = np.inf, (1, 2)
-    for later in range(2, n):
-        earlier = np.arange(1, later)
-        costs = within(0, earlier) + within(earlier, later)
-        total = costs.min() + within(later, n)
-        if total < least:
-            least, best = total, (1 + int(costs.argmin()), later)
-    return best
 
 
 def _smallest_gap(weights: NDArray[np.float64], grouping: Grouping) -> float:

@@ -1,8 +1,7 @@
 """From a score to weights and groups: the two ways of judging a pool, behind one form.
 
-* `norm`, the default: the losses of `norm_score`. The cut lies two thirds of the way from the mean
-  of the lower to the mean of the upper cluster of sqrt(l), and never below SMALLEST_CUT: what costs
-  less than that is variety. Below it nothing is flagged, which is how a clean pool stays clean.
+* `norm`, the default: the losses of `norm_score`, and what steps add of which nothing came; cut and
+  grouped by `decision`.
 * `equation3`: the paper's conditional next-step model, trimmed, and k-means on its weights.
 """
 
@@ -12,24 +11,22 @@ from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from filtering.decision import decide
 from filtering.findings import Findings, Places, find_departures, find_surprises
 from filtering.sequence import transitions
 from filtering.thresholds import Grouping, group_weights
-from filtering.weights.norm_score import near_and_far, score_steps
+from filtering.weights.norm_score import NormScore, score_steps
 from filtering.weights.precedence import Pairs, precedence_graph
 from filtering.weights.problem import Problem
 from filtering.weights.score import score
 from filtering.weights.solvers import solver_named
 from filtering.weights.steps import Array, StepCounts, StepList, count_steps
-from teasim.errors import ConfigError
+from teasim.errors import named
 from teasim.pool import Span
 
-SMALLEST_CUT = 2.0
-"""Losses up to this are never flagged on their own [nats]."""
-CUT_SHARE = 2 / 3
-"""Where between the two clusters' means of sqrt(l) the cut lies."""
+IDLE_DOUBT = 1.0
+"""Log-odds against a step in vain before it is looked at [nats]."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +37,12 @@ class Evidence:
     """Names of the T sub-task labels."""
     segments: tuple[tuple[Span, ...], ...]
     """Per demonstration its q segments."""
-    states: Sequence[Array]
-    """Per demonstration (q, N): what each segment looks like, rows of mean squared length 1."""
+    states: Sequence[Array] = ()
+    """Per demonstration (q, N): what each segment looks like, rows of mean squared length 1; empty
+    where the score does not ask."""
+    idle: Sequence[Array] | None = None
+    """Per demonstration (q,): how surprising it is that so little came of each segment [nats]; None
+    where nobody looked."""
 
     @cached_property
     def labels(self) -> list[list[int]]:
@@ -103,16 +104,30 @@ def by_norm(evidence: Evidence, rule: Rule) -> Verdict:
     counts = evidence.counts
     if rule.precedence:
         counts = counts.restricted(precedence_graph(rule.precedence, evidence.subtasks))
-    found = score_steps(counts, tolerance=rule.tolerance)
-    losses = found.losses
-    cut = cut_of(losses)
-    weights = 1 / (1 + (losses / cut) ** 2)  # one half at the cut
-    flagged = losses > cut
-    grouping = Grouping(flagged.astype(np.int64), 0.5 * flagged.any())
-    if (rule.groups, rule.threshold) != ("auto", "auto"):
-        grouping = group_weights(weights, rule.groups, _method(rule))
-    findings = find_departures(found, evidence.labels, evidence.places)
-    return Verdict(losses, weights, grouping, found.trust, findings)
+    found = score_steps(counts, tolerance=rule.tolerance, n_groups=3 if rule.groups == "3" else 2)
+    vain = in_vain(found, evidence)
+    worst_vain = np.array([nats.max(initial=0.0) for nats in vain])
+    losses = found.losses + worst_vain
+    decision = decide(losses, found.left_out + worst_vain > found.out_of_order, rule.groups)
+    grouping = decision.grouping
+    if rule.threshold != "auto":
+        grouping = group_weights(decision.weights, rule.groups, rule.threshold)
+    findings = find_departures(found, evidence.labels, evidence.places, vain)
+    return Verdict(losses, decision.weights, grouping, found.trust, findings)
+
+
+def in_vain(found: NormScore, evidence: Evidence) -> list[Array]:
+    """Return per demonstration (q,): what each segment adds of which nothing came [nats].
+
+    A step in vain is at most as bad as one left out; and because few steps are in vain, IDLE_DOUBT
+    nats of evidence are needed before one counts. Only the worst segment counts for the loss.
+    """
+    if evidence.idle is None:
+        return [np.zeros(len(labels)) for labels in evidence.labels]
+    return [
+        np.clip(nats - IDLE_DOUBT, 0.0, usual[labels])
+        for nats, usual, labels in zip(evidence.idle, found.usual, evidence.labels, strict=True)
+    ]
 
 
 def by_equation_3(evidence: Evidence, rule: Rule) -> Verdict:
@@ -135,15 +150,6 @@ def _method(rule: Rule) -> str:
     return "kmeans" if rule.threshold == "auto" else rule.threshold
 
 
-def cut_of(losses: NDArray[np.float64]) -> float:
-    """Loss above which a demonstration is flagged [nats], for losses (D,)."""
-    low, high = near_and_far(losses)
-    if not len(high):
-        return SMALLEST_CUT
-    between = low.mean() + CUT_SHARE * (high.mean() - low.mean())
-    return max(float(between) ** 2, SMALLEST_CUT)
-
-
 JUDGES: Mapping[str, Judge] = MappingProxyType({"norm": by_norm, "equation3": by_equation_3})
 """Every way of judging by name."""
 
@@ -154,6 +160,4 @@ def judge_named(name: str) -> Judge:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in JUDGES:
-        raise ConfigError(f"Unknown score '{name}'; choose {', '.join(JUDGES)}.")
-    return JUDGES[name]
+    return named("score", JUDGES, name)

@@ -11,6 +11,9 @@ Observation = Mapping[str, Any]
 """One of `TeaMakingSubtasks-v0`: `pixels` ((H, W, 3) uint8 per camera) and `agent_pos` (J,), or
 `agent_pos` and `environment_state` (E,)."""
 
+STATE_KEYS = ("agent_pos", "environment_state")
+"""Parts of the observation that are the state, in the order in which a policy sees them."""
+
 RecurrentState = tuple[NDArray[np.floating[Any]], ...]
 """What a policy with a memory carries from one decision to the next."""
 

@@ -10,8 +10,8 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
 from policies.base import ObservationSpec
-from policies.chunk_network import ChunkNetwork, ChunkShape
-from policies.motion_policy import MotionPolicy
+from policies.joint.memory import Memory, MemoryShape
+from policies.joint.policy import MotionPolicy
 from policies.networks import DecisionNetwork, Ensemble, NetworkShape, RecurrentNetwork
 from policies.subtask_policy import SubtaskPolicy
 from teasim.pool.checkpoint import CheckpointKind
@@ -33,7 +33,7 @@ KINDS = {
         network.kind: Kind(network, NetworkShape, SubtaskPolicy)
         for network in (DecisionNetwork, Ensemble, RecurrentNetwork)
     },
-    ChunkNetwork.kind: Kind(ChunkNetwork, ChunkShape, MotionPolicy),
+    Memory.kind: Kind(Memory, MemoryShape, MotionPolicy),
 }
 """The networks a policy may have, by the name they are saved under."""
 

@@ -4,7 +4,7 @@ Nothing heavy is imported before a verb's options were understood.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,7 +14,7 @@ import tyro
 from teasim.parallel import default_jobs
 
 if TYPE_CHECKING:
-    from policies.motion_policy import MotionPolicy
+    from policies.joint.policy import MotionPolicy
     from policies.subtask_policy import SubtaskPolicy
 
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
@@ -30,9 +30,9 @@ class TrainOptions:
     """New folder for the policy."""
     learner: str = "bc"
     """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (against wrong
-    demonstrations); bc-chunk at the level joint."""
+    demonstrations); nearest at the level joint."""
     level: str = "subtask"
-    """What is decided: subtask (which comes next) or joint (where the joints go; bc-chunk)."""
+    """What is decided: subtask (which comes next) or joint (where the joints go; nearest)."""
     weights: Path | None = None
     """Weight table (weights.csv of `teasim filter`)."""
     use: str | None = None
@@ -136,7 +136,7 @@ def evaluate(argv: Sequence[str]) -> int:
     """Run a trained policy in the environment and score it."""
     options = tyro.cli(EvaluateOptions, args=list(argv), prog="teasim evaluate")
     from policies.checkpoint import load_policy
-    from policies.motion_policy import MotionPolicy
+    from policies.joint.policy import MotionPolicy
     from policies.outputs import check_file
 
     check_file(options.json)
@@ -150,8 +150,7 @@ def evaluate(argv: Sequence[str]) -> int:
 def _evaluate_subtasks(policy: "SubtaskPolicy", options: EvaluateOptions) -> int:
     """Run a policy over sub-tasks and score its choices."""
     from policies.comparison import compare, comparison_json, comparison_text
-    from policies.evaluation import EvaluationConfig
-    from policies.evaluation import evaluate as try_policy
+    from policies.evaluation import EvaluationConfig, evaluate_all
     from policies.results import Bar, summary, write_junit, write_scores
     from policies.rollout import ENVIRONMENT, EnvironmentConfig
 
@@ -160,13 +159,12 @@ def _evaluate_subtasks(policy: "SubtaskPolicy", options: EvaluateOptions) -> int
         options.env_id or ENVIRONMENT, options.quality, options.randomize, options.max_actions
     )
     config = EvaluationConfig(options.episodes, options.seed, world, options.video)
-    other = None if options.against is None else _load_rival(options.against)
-    scores = try_policy(policy, config, jobs=options.jobs)
+    rivals = [] if options.against is None else [_load_rival(options.against)]
+    scores, *others = evaluate_all([policy, *rivals], config, jobs=options.jobs)
     about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
     print(summary(scores))
-    if other is not None:
-        rival = try_policy(other, replace(config, video=None), jobs=options.jobs)
-        found = compare(scores, rival)
+    for other in others:
+        found = compare(scores, other)
         about |= {"against": str(options.against), "comparison": comparison_json(found)}
         print(comparison_text(found, str(options.against)))
     if options.json:
@@ -182,7 +180,7 @@ def _evaluate_subtasks(policy: "SubtaskPolicy", options: EvaluateOptions) -> int
 def _load_rival(run: Path) -> "SubtaskPolicy":
     """Read a policy that one over sub-tasks can be compared with."""
     from policies.checkpoint import load_policy
-    from policies.motion_policy import MotionPolicy
+    from policies.joint.policy import MotionPolicy
     from teasim.errors import ConfigError
 
     policy = load_policy(run)
@@ -196,9 +194,9 @@ def _load_rival(run: Path) -> "SubtaskPolicy":
 def _evaluate_joints(policy: "MotionPolicy", options: EvaluateOptions) -> int:
     """Run a policy of the joint level and score how far it gets."""
     from policies.evaluation import EvaluationConfig
-    from policies.motion_evaluation import evaluate_motion
-    from policies.motion_results import motion_json, motion_summary
-    from policies.motion_rollout import JOINT_ENVIRONMENT
+    from policies.joint.evaluation import evaluate_motion
+    from policies.joint.results import motion_json, motion_summary
+    from policies.joint.rollout import JOINT_ENVIRONMENT
     from policies.rollout import EnvironmentConfig
     from teasim.errors import ConfigError
     from teasim.pool.files import write_json

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from policies.evaluation import Scores
-from policies.rollout import Episode
 from policies.statistics import Difference, bootstrap_difference, mcnemar
 from teasim.errors import ConfigError
 
@@ -84,11 +83,7 @@ def _compare(first: Scores, second: Scores) -> Comparison:
 
 def _correct(scores: Scores) -> list[tuple[int, int]]:
     """Correct and all actions of every episode."""
-    return [_count(episode) for episode in scores.episodes]
-
-
-def _count(episode: Episode) -> tuple[int, int]:
-    return sum(action.correct for action in episode.actions), len(episode.actions)
+    return [(episode.n_correct, len(episode.actions)) for episode in scores.episodes]
 
 
 def _discordance(first: list[bool], second: list[bool]) -> Discordance:

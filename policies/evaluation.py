@@ -6,13 +6,17 @@ them.
 """
 
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from policies.base import Policy
+import gymnasium as gym
+
+from policies.base import ObservationSpec, Policy
 from policies.networks import one_thread
+from policies.remembering import Remembering, can_remember
 from policies.rollout import EnvironmentConfig, Episode, make_environment, run_episode
 from policies.statistics import Rate, grouped_rate, rate
 from teasim import parallel
@@ -25,6 +29,9 @@ SPILL = "spilled_"
 
 EPISODES_PER_BATCH = 4
 """Episodes that share one environment: few enough to keep all workers busy until the end."""
+
+World = Callable[[ObservationSpec], gym.Env[Any, Any]]
+"""Gives the environment in which policies that see so play."""
 
 
 @dataclass(frozen=True)
@@ -72,13 +79,11 @@ class Scores:
 
 @dataclass(frozen=True)
 class Batch:
-    """Episodes that one worker plays one after the other."""
+    """Scenes that one worker plays one after the other."""
 
-    policy: Policy
-    mode: str
+    policies: tuple[Policy, ...]
     seeds: tuple[int, ...]
-    environment: EnvironmentConfig
-    video: Path | None
+    config: EvaluationConfig
 
 
 def evaluate(policy: Policy, config: EvaluationConfig, *, jobs: int = 1) -> dict[str, Scores]:
@@ -88,34 +93,76 @@ def evaluate(policy: Policy, config: EvaluationConfig, *, jobs: int = 1) -> dict
         CheckpointError: the policy was trained for another environment.
         ConfigError: the environment cannot be made.
     """
+    return evaluate_all([policy], config, jobs=jobs)[0]
+
+
+def evaluate_all(
+    policies: Sequence[Policy], config: EvaluationConfig, *, jobs: int = 1
+) -> list[dict[str, Scores]]:
+    """Try all `policies` in the same scenes; what they do alike is carried out once.
+
+    Each gets the scores that `evaluate` gives it alone. Only the first is filmed.
+
+    Raises:
+        CheckpointError: a policy was trained for another environment.
+        ConfigError: the environment cannot be made.
+    """
     batches = [
-        Batch(policy, mode, seeds, config.environment, _video_of(config, mode))
-        for mode in MODES
+        Batch(tuple(policies), seeds, config)
         for seeds in _batches(range(config.seed, config.seed + config.episodes))
     ]
-    played = parallel.run(play, batches, jobs=jobs, description="episodes")
-    scores = {}
-    for mode in MODES:
-        pairs = zip(batches, played, strict=True)
-        episodes = [episode for batch, part in pairs if batch.mode == mode for episode in part]
-        scores[mode] = score(mode, episodes, policy.action_names)
-    return scores
+    parts = parallel.run(_play_batch, batches, jobs=jobs, description="episodes")
+    return [
+        {
+            mode: score(mode, [e for part in parts for e in part[n][mode]], policy.action_names)
+            for mode in MODES
+        }
+        for n, policy in enumerate(policies)
+    ]
 
 
-def play(batch: Batch) -> list[Episode]:
-    """Play the episodes of `batch` in one environment, made here in the worker."""
-    filmed = batch.video is not None
-    env = make_environment(batch.environment, batch.policy.spec, filmed=filmed)
-    with one_thread(), closing(env):
+@contextmanager
+def worlds(config: EnvironmentConfig, *, filmed: bool = False) -> Iterator[World]:
+    """Open what gives policies their environments; those that see alike share one."""
+    with ExitStack() as stack:
+        made: dict[ObservationSpec, gym.Env[Any, Any]] = {}
+
+        def world(spec: ObservationSpec) -> gym.Env[Any, Any]:
+            if spec not in made:
+                env = stack.enter_context(closing(make_environment(config, spec, filmed=filmed)))
+                made[spec] = Remembering(env) if can_remember(env) else env
+            return made[spec]
+
+        yield world
+
+
+def play(
+    env: gym.Env[Any, Any], policy: Policy, seeds: Sequence[int], film: Path | None = None
+) -> dict[str, list[Episode]]:
+    """Play the scenes `seeds` in both modes; `film` is a folder for the deterministic ones."""
+    with one_thread():
+        return {
+            mode: [
+                run_episode(
+                    env,
+                    policy,
+                    seed,
+                    deterministic=mode == "deterministic",
+                    video=film / f"episode_{seed}.mp4" if film and mode == MODES[0] else None,
+                )
+                for seed in seeds
+            ]
+            for mode in MODES
+        }
+
+
+def _play_batch(batch: Batch) -> list[dict[str, list[Episode]]]:
+    """Play `batch` in environments made here in the worker."""
+    film = batch.config.video
+    with worlds(batch.config.environment, filmed=film is not None) as world:
         return [
-            run_episode(
-                env,
-                batch.policy,
-                seed,
-                deterministic=batch.mode == "deterministic",
-                video=batch.video / f"episode_{seed}.mp4" if batch.video else None,
-            )
-            for seed in batch.seeds
+            play(world(policy.spec), policy, batch.seeds, None if n else film)
+            for n, policy in enumerate(batch.policies)
         ]
 
 
@@ -126,7 +173,7 @@ def score(mode: str, episodes: Sequence[Episode], subtasks: Sequence[str]) -> Sc
     return Scores(
         mode,
         tuple(episodes),
-        grouped_rate([(sum(a.correct for a in e.actions), len(e.actions)) for e in episodes]),
+        grouped_rate([(e.n_correct, len(e.actions)) for e in episodes]),
         grouped_rate([(sum(a.allowed for a in e.actions), len(e.actions)) for e in episodes]),
         rate(sum(episode.success for episode in episodes), count),
         rate(sum(episode.unsafe for episode in episodes), count),
@@ -146,7 +193,3 @@ def _spilled(episode: Episode) -> bool:
 def _batches(seeds: Sequence[int]) -> list[tuple[int, ...]]:
     size = EPISODES_PER_BATCH
     return [tuple(seeds[first : first + size]) for first in range(0, len(seeds), size)]
-
-
-def _video_of(config: EvaluationConfig, mode: str) -> Path | None:
-    return config.video if mode == "deterministic" else None

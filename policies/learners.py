@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.bc import BC, BCConfig
-from policies.bc_chunk import BCChunk, BCChunkConfig
 from policies.bc_rnn import BCRNN, BCRNNConfig
 from policies.bcnd import BCND, BCNDConfig
 from policies.demodice import DemoDICE, DemoDICEConfig
+from policies.joint.nearest import Nearest, NearestConfig
 from policies.r_maxent import RMaxEnt, RMaxEntConfig
-from teasim.errors import ConfigError
+from teasim.errors import ConfigError, named
 
 
 class Learner(Protocol):
@@ -56,10 +56,10 @@ class LearnerKind:
 
 LEARNERS = {
     "bc": LearnerKind(BC, BCConfig, ("subtask",)),
-    "bc-chunk": LearnerKind(BCChunk, BCChunkConfig, ("joint",)),
     "bc-rnn": LearnerKind(BCRNN, BCRNNConfig, ("subtask",)),
     "bcnd": LearnerKind(BCND, BCNDConfig, ("subtask",)),
     "demodice": LearnerKind(DemoDICE, DemoDICEConfig, ("subtask",)),
+    "nearest": LearnerKind(Nearest, NearestConfig, ("joint",)),
     "r-maxent": LearnerKind(RMaxEnt, RMaxEntConfig, ("subtask",)),
 }
 
@@ -70,9 +70,7 @@ def find_learner(name: str, level: str) -> LearnerKind:
     Raises:
         ConfigError: no such learner, or not at that level.
     """
-    if name not in LEARNERS:
-        raise ConfigError(f"Unknown learner '{name}'; choose {', '.join(LEARNERS)}.")
-    kind = LEARNERS[name]
+    kind = named("learner", LEARNERS, name)
     if level not in kind.levels:
         raise ConfigError(
             f"The learner '{name}' has no level '{level}'; choose {', '.join(kind.levels)}."

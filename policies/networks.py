@@ -133,7 +133,20 @@ class Encoder(nn.Module):
         return torch.cat([strongest, numbers], dim=1)
 
 
-class DecisionNetwork(nn.Module):
+class Memoryless(nn.Module):
+    """A network that chooses from what is seen now, whatever came before."""
+
+    def step(
+        self,
+        maps: Tensor,
+        low_dim: Tensor,
+        memory: Memory | None,  # noqa: ARG002  (the protocol's)
+    ) -> tuple[Tensor, Memory]:
+        """Return logits (n, A); nothing is remembered."""
+        return self(maps, low_dim), ()
+
+
+class DecisionNetwork(Memoryless):
     """Feature maps (n, K, C, h, w) and state (n, S) -> logits (n, A), without memory."""
 
     kind: ClassVar[str] = "decision"
@@ -159,17 +172,8 @@ class DecisionNetwork(nn.Module):
         logits: Tensor = self.head(self.encoder(maps, low_dim))
         return logits
 
-    def step(
-        self,
-        maps: Tensor,
-        low_dim: Tensor,
-        memory: Memory | None,  # noqa: ARG002  (the protocol's)
-    ) -> tuple[Tensor, Memory]:
-        """Return logits (n, A); nothing is remembered."""
-        return self(maps, low_dim), ()
 
-
-class Ensemble(nn.Module):
+class Ensemble(Memoryless):
     """Networks that vote: the probability of a sub-task is the mean of the members'."""
 
     kind: ClassVar[str] = "ensemble"
@@ -195,15 +199,6 @@ class Ensemble(nn.Module):
         """Return logits (n, A) float64, here the logarithm of the mean probability."""
         votes = torch.stack([member(maps, low_dim).log_softmax(dim=1) for member in self.members])
         return votes.logsumexp(dim=0) - math.log(len(votes))
-
-    def step(
-        self,
-        maps: Tensor,
-        low_dim: Tensor,
-        memory: Memory | None,  # noqa: ARG002  (the protocol's)
-    ) -> tuple[Tensor, Memory]:
-        """Return logits (n, A); nothing is remembered."""
-        return self(maps, low_dim), ()
 
 
 class RecurrentNetwork(nn.Module):

@@ -62,6 +62,11 @@ class Episode:
     violations: tuple[str, ...]
     """Rules that were broken."""
 
+    @property
+    def n_correct(self) -> int:
+        """How many of the executed actions are the reference's."""
+        return sum(action.correct for action in self.actions)
+
 
 def make_environment(
     config: EnvironmentConfig, spec: ObservationSpec, *, filmed: bool = False
@@ -79,13 +84,13 @@ def make_environment(
         sight = {"obs_type": "pixels_agent_pos", "cameras": spec.cameras, **size}
     elif filmed:
         sight["render_mode"] = "rgb_array"
-    limit = {} if config.max_actions is None else {"max_actions": config.max_actions}
+    if config.max_actions is not None:
+        sight["max_actions"] = config.max_actions
     try:
         return gym.make(
             config.env_id,
             quality=config.quality,
             randomize=config.randomize,
-            **limit,
             **sight,
         )
     except (gym.error.Error, TypeError, ImportError) as error:

@@ -27,14 +27,11 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor
 
-from policies.base import ObservationSpec
+from policies.base import STATE_KEYS, ObservationSpec
 from policies.networks import DecisionNetwork
 from policies.rollout import EnvironmentConfig, make_environment
 from policies.subtask_policy import SubtaskPolicy
 from teasim.errors import ConfigError
-
-STATE_KEYS = ("agent_pos", "environment_state")
-"""Parts of the observation in the order in which a policy sees them."""
 
 
 class FlatPictures(gym.ObservationWrapper[Any, Any, Any]):

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from policies.base import Observation, ObservationSpec, RecurrentState, pictures
+from policies.base import STATE_KEYS, Observation, ObservationSpec, RecurrentState, pictures
 from policies.features import NO_MAPS, Maps, camera_maps
 from policies.networks import SubtaskNetwork, one_thread
 
@@ -77,7 +77,7 @@ def _look(
 ) -> tuple[Maps, NDArray[np.float32], bool]:
     """Return maps (n, K, C, h, w), state (n, S), and whether it was one observation, no batch."""
     if not spec.cameras:
-        parts = [np.asarray(observation[key]) for key in ("agent_pos", "environment_state")]
+        parts = [np.asarray(observation[key]) for key in STATE_KEYS]
         numbers = np.concatenate(parts, axis=-1)
         low_dim = np.atleast_2d(numbers)
         return np.empty((len(low_dim), *NO_MAPS), np.float16), low_dim, numbers.ndim == 1

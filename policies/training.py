@@ -11,8 +11,8 @@ from typing import Any
 from policies.base import DecisionSamples
 from policies.checkpoint import save_policy
 from policies.demos import DemosConfig, load_decisions
+from policies.joint.motions import MotionSamples, load_motions
 from policies.learners import LEARNERS, LearnerKind, find_learner
-from policies.motions import MotionSamples, load_motions
 from policies.weighting import demo_weights, likely_experts
 from teasim.errors import ConfigError
 from teasim.pool import Pool

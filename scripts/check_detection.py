@@ -1,22 +1,28 @@
 """Find the incorrect demonstrations of many pools drawn from a bank of rendered ones.
 
-The bank is the demonstrations of all POOLs together; each is segmented once, from its video alone.
-Labels of the demonstrations draw the pools and score what was found; the filter does not see them.
+The bank is the demonstrations of all POOLs together; each is segmented once, and looked at before
+and after its segments, from its videos alone. Labels of the demonstrations draw the pools and score
+what was found; the filter does not see them.
 """
 
 import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from filtering.baselines import BASELINES
+from filtering.demo_filter import FilterConfig
+from filtering.effects.rests import changes, look_at_rests
+from filtering.effects.surprise import effect_surprises
+from filtering.frame_features import FrameSource
 from filtering.segmentation.segmenter import segmenter_named
-from filtering.verdict import Verdict, by_norm
-from filtering.weights.steps import StepList, count_steps
+from filtering.verdict import Evidence, Verdict, by_norm
+from filtering.weights.steps import StepList
 from policies.statistics import wilson_interval
-from teasim.pool import Pool
+from teasim.pool import Pool, Span
 from teasim.pool.leakage import auroc
 
 SIZES = (1, 2, 4, 6, 8)
@@ -27,8 +33,10 @@ SIZES = (1, 2, 4, 6, 8)
 class Demo:
     """A demonstration of the bank."""
 
-    steps: StepList
+    spans: tuple[Span, ...]
     """What the segmenter saw."""
+    changes: np.ndarray | None
+    """(q, F) what each segment changed in the picture."""
     sequence: str
     """Order of its sub-tasks, the truth."""
     mistakes: frozenset[str]
@@ -43,6 +51,11 @@ class Outcome:
     wrong: np.ndarray
 
     @property
+    def flagged(self) -> np.ndarray:
+        """(D,) what was flagged."""
+        return self.verdict.grouping.flagged
+
+    @property
     def found(self) -> int:
         """Wrong ones that were flagged."""
         return int((self.flagged & self.wrong).sum())
@@ -52,35 +65,36 @@ class Outcome:
         """Right ones that were flagged."""
         return int((self.flagged & ~self.wrong).sum())
 
-    @property
-    def flagged(self) -> np.ndarray:
-        """(D,) what was flagged."""
-        return self.verdict.grouping.flagged
 
-
-def bank(pools: Iterable[Path], segmenter: str, jobs: int) -> tuple[list[Demo], int]:
-    """Segment all demonstrations; return them and the number of sub-tasks."""
+def bank(
+    pools: Iterable[Path], segmenter: str, effects: bool, jobs: int
+) -> tuple[list[Demo], tuple[str, ...]]:
+    """Look at all demonstrations; return them and the names of the sub-tasks."""
     demos: list[Demo] = []
     names: tuple[str, ...] = ()
     for path in pools:
         pool = Pool.open(path)
         found = segmenter_named(segmenter)(pool, jobs=jobs)
         names = found.subtasks
-        for episode, spans, labels in zip(pool.episodes, found.spans, found.labels(), strict=True):
-            if episode.demo_id in found.labelled or episode.record is None:
-                continue
-            steps = StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
-            kinds = frozenset(mistake.name for mistake in episode.record.mistakes)
-            demos.append(Demo(steps, episode.record.sequence, kinds))
-    return demos, len(names)
+        source = FrameSource(pool.cameras)
+        rests = [None] * len(pool.episodes)
+        if effects:
+            rests = look_at_rests(pool.episodes, found.spans, pool.fps, source, jobs=jobs)
+        for episode, spans, rest in zip(pool.episodes, found.spans, rests, strict=True):
+            record = episode.record
+            if record is not None and episode.demo_id not in found.labelled:
+                kinds = frozenset(mistake.name for mistake in record.mistakes)
+                changed = None if rest is None else changes(rest)
+                demos.append(Demo(spans, changed, record.sequence, kinds))
+    return demos, names
 
 
 class Draws:
     """Draws pools from the bank and judges them."""
 
-    def __init__(self, demos: Sequence[Demo], n_subtasks: int, pools: int) -> None:
+    def __init__(self, demos: Sequence[Demo], subtasks: tuple[str, ...], pools: int) -> None:
         """Keep the bank; `pools` are drawn for every row."""
-        self.demos, self.n_subtasks, self.pools = demos, n_subtasks, pools
+        self.demos, self.subtasks, self.pools = demos, subtasks, pools
 
     def judge(self, kinds: Sequence[tuple[str, int]], groups: str, row: int) -> list[Outcome]:
         """Draw `count` demonstrations of each sequence; those after the first kind are wrong."""
@@ -96,8 +110,11 @@ class Draws:
 
     def outcome(self, demos: Sequence[Demo], wrong: np.ndarray, groups: str) -> Outcome:
         """Judge one pool."""
-        counts = count_steps([demo.steps for demo in demos], self.n_subtasks)
-        return Outcome(by_norm(counts, None, groups), wrong)  # type: ignore[arg-type]
+        known = Evidence(self.subtasks, tuple(demo.spans for demo in demos))
+        changed = [demo.changes for demo in demos if demo.changes is not None]
+        if changed:
+            known = replace(known, idle=effect_surprises(changed, known.labels))
+        return Outcome(by_norm(known, FilterConfig(groups=groups).rule()), wrong)
 
     def _draw(self, kind: str, count: int, rng: np.random.Generator) -> list[Demo]:
         able = [demo for demo in self.demos if demo.sequence == kind and _plain(demo)]
@@ -134,7 +151,7 @@ def kinds_table(draws: Draws) -> None:
     kinds = sorted({kind for demo in draws.demos for kind in demo.mistakes})
     correct = [demo for demo in draws.demos if not demo.mistakes]
     areas: dict[str, list[float]] = {kind: [] for kind in kinds}
-    lengths: list[float] = []
+    areas_of_baselines: dict[str, list[float]] = {name: [] for name in BASELINES}
     for number in range(draws.pools):
         rng = np.random.default_rng([30, number])
         pool = [correct[i] for i in rng.choice(len(correct), 10, replace=False)]
@@ -146,11 +163,21 @@ def kinds_table(draws: Draws) -> None:
         for position, kind in enumerate(kinds, start=10):
             chosen = [*range(10), position]
             areas[kind].append(auroc(losses[chosen], wrong[chosen]))
-        lengths.append(auroc(np.array([-sum(d.steps.lengths) for d in pool], dtype=float), wrong))
+        steps = [_steps(demo, draws.subtasks) for demo in pool]
+        for name, baseline in BASELINES.items():
+            areas_of_baselines[name].append(auroc(baseline(steps), wrong))
     for kind in kinds:
         print(f"{kind:16} AUROC {np.mean(areas[kind]):.3f}")
     print(f"{'macro':16} AUROC {np.mean([np.mean(a) for a in areas.values()]):.3f}")
-    print(f"{'length alone':16} AUROC {np.mean(lengths):.3f}")
+    for name, found in areas_of_baselines.items():
+        print(f"{name:16} AUROC {np.mean(found):.3f}  (all kinds together, a baseline)")
+
+
+def _steps(demo: Demo, subtasks: tuple[str, ...]) -> StepList:
+    return StepList(
+        tuple(subtasks.index(span.subtask) for span in demo.spans),
+        tuple(span.stop - span.start for span in demo.spans),
+    )
 
 
 def _print(name: str, outcomes: Sequence[Outcome]) -> None:
@@ -178,12 +205,14 @@ def main() -> int:
     parser.add_argument("bank", nargs="+", type=Path, metavar="POOL")
     parser.add_argument("--segmenter", required=True, help="truth, clustering or a folder")
     parser.add_argument("--table", choices=TABLES, default="orders")
+    parser.add_argument("--no-effects", action="store_true", help="judge by the steps alone")
     parser.add_argument("--pools", type=int, default=30, help="random pools per row")
     parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
     arguments = parser.parse_args()
-    demos, n_subtasks = bank(arguments.bank, arguments.segmenter, arguments.jobs)
+    effects = not arguments.no_effects
+    demos, subtasks = bank(arguments.bank, arguments.segmenter, effects, arguments.jobs)
     print(f"bank: {len(demos)} demonstrations")
-    TABLES[arguments.table](Draws(demos, n_subtasks, arguments.pools))
+    TABLES[arguments.table](Draws(demos, subtasks, arguments.pools))
     return 0
 
 

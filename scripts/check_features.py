@@ -2,8 +2,9 @@
 
 Segments of TRAIN teach a bottleneck, a ranking of its channels and two simple classifiers; segments
 of TEST are named by these from raw, reduced and ranked features, with and without the background.
-Then channels are erased: the best ranked ones must be missed more than random ones. The labels of
-the pools are read for learning and for counting only.
+Then channels are erased: the best ranked ones must be missed more than random ones. In pools drawn
+from BANK equation 3 looks for incorrect demonstrations by each kind of features. The labels of the
+pools are read for learning, for drawing and for counting only.
 """
 
 import argparse
@@ -19,6 +20,7 @@ from sklearn.neighbors import NearestCentroid
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from filtering.demo_filter import FilterConfig
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import GeneratorConfig
 from filtering.features.erasure import rank_channels
@@ -26,8 +28,11 @@ from filtering.features.extraction import foreground
 from filtering.features.generator import FeatureGenerator
 from filtering.features.maps import segment_maps
 from filtering.features.pictures import overlay
+from filtering.features.reduction import reduce_features
 from filtering.frames import segment_indices
+from filtering.verdict import Evidence, by_equation_3
 from teasim.pool import Episode, Pool
+from teasim.pool.leakage import auroc
 
 DRAWS = 30
 """Random sets of channels that are erased."""
@@ -56,6 +61,8 @@ def main() -> int:
     parser.add_argument("--backgrounds", nargs="+", default=["none", "median"])
     parser.add_argument("--cache", type=Path, required=True, help="where feature maps are kept")
     parser.add_argument("--pictures", type=Path, help="PNG of what the best channels look at")
+    parser.add_argument("--bank", type=Path, help="pool of Seq_1 and Seq_3 to draw pools from")
+    parser.add_argument("--pools", type=int, default=30, help="pools that are drawn")
     arguments = parser.parse_args()
     pools = Pool.open(arguments.train), Pool.open(arguments.test)
     missed = []
@@ -70,6 +77,8 @@ def main() -> int:
         generator = FeatureGenerator(GeneratorConfig()).fit(seen, train.labels.tolist())
         ablation(background, bottleneck, generator, train, test)
         missed.append(erasure(generator, bottleneck.transform(test.maps), test.labels))
+        if arguments.bank:
+            detection(Pool.open(arguments.bank), background, bottleneck, generator, arguments)
         if arguments.pictures and background == arguments.backgrounds[0]:
             draw(arguments, pools[1], bottleneck, generator)
     return int(min(missed) <= 0)
@@ -79,20 +88,67 @@ def ablation(
     background: str, bottleneck: Bottleneck, generator: FeatureGenerator, train: Clips, test: Clips
 ) -> None:
     """Print how well simple classifiers name segments from three kinds of features."""
-    reduced = [bottleneck.transform(clips.maps) for clips in (train, test)]
-    kinds = {
-        "raw": [_strongest([m.max(axis=(2, 3)) for m in clips.maps]) for clips in (train, test)],
-        "bottleneck": [_strongest(seen) for seen in reduced],
-        "ranked": [generator.transform(seen)[:, generator.kept_] for seen in reduced],
-    }
-    for kind, (known, new) in kinds.items():
-        shares = []
+    known_kinds, new_kinds = (kinds(clips.maps, bottleneck, generator) for clips in (train, test))
+    for kind, known in known_kinds.items():
+        new, shares = new_kinds[kind], []
         for classifier in (NearestCentroid(), LogisticRegression(max_iter=1000)):
             fitted = make_pipeline(StandardScaler(), classifier).fit(known, train.labels)
             shares.append(100 * fitted.score(new, test.labels))
         print(f"{background:12}{kind:12}{shares[0]:18.1f}{shares[1]:8.1f}", flush=True)
-    named = float((generator.predict(reduced[1]) == test.labels).mean())
+    named = float((generator.predict(bottleneck.transform(test.maps)) == test.labels).mean())
     print(f"{background:12}{'graph':12}{'':18}{100 * named:8.1f}   (relations of intervals)")
+
+
+def kinds(
+    maps: Sequence[np.ndarray], bottleneck: Bottleneck, generator: FeatureGenerator
+) -> dict[str, np.ndarray]:
+    """Return the features of segments by kind, (S, F) each."""
+    seen = bottleneck.transform(maps)
+    return {
+        "raw": _strongest([m.max(axis=(2, 3)) for m in maps]),
+        "bottleneck": _strongest(seen),
+        "ranked": generator.transform(seen)[:, generator.kept_],
+    }
+
+
+def detection(
+    pool: Pool,
+    background: str,
+    bottleneck: Bottleneck,
+    generator: FeatureGenerator,
+    arguments: argparse.Namespace,
+) -> None:
+    """Print how well equation 3 finds 4 Seq_3 among 10 Seq_1 by each kind of features."""
+    sequences = [episode.record.sequence if episode.record else "" for episode in pool.episodes]
+    described = [
+        kinds(_episode_maps(pool, episode, background, arguments), bottleneck, generator)
+        for episode in pool.episodes
+    ]
+    wrong = np.arange(14) >= 10
+    rule = FilterConfig(score="equation3").rule()
+    for kind in described[0]:
+        areas, found, accused = [], 0, 0
+        for number in range(arguments.pools):
+            rng = np.random.default_rng(number)
+            drawn = [
+                int(index)
+                for sequence, count in (("seq_1", 10), ("seq_3", 4))
+                for index in rng.choice(
+                    np.flatnonzero(np.array(sequences) == sequence), count, replace=False
+                )
+            ]
+            spans = tuple(pool.episodes[index].spans() for index in drawn)
+            states = reduce_features([described[index][kind] for index in drawn])
+            verdict = by_equation_3(Evidence(pool.subtasks, spans, states), rule)
+            areas.append(auroc(verdict.losses, wrong))
+            found += int(verdict.grouping.flagged[wrong].sum())
+            accused += int(verdict.grouping.flagged[~wrong].sum())
+        print(
+            f"{background:12}{kind:12}equation 3, {arguments.pools} pools of 10 Seq_1 + 4 Seq_3: "
+            f"AUROC {np.mean(areas):.3f}, found {found} of {4 * arguments.pools}, "
+            f"accused per pool {accused / arguments.pools:.2f}",
+            flush=True,
+        )
 
 
 def erasure(

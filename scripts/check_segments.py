@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from filtering.frame_features import FrameSource, sampled_frames
 from filtering.frames import main_camera
-from filtering.segmentation.clustering import looks, subtask_count
+from filtering.segmentation.clustering import RATE, looks, subtask_count
 from filtering.segmentation.discovery import Discovery, discover
 from teasim.pool import Pool
 from teasim.pool.types import index_from_spans
@@ -54,7 +54,7 @@ def main() -> int:
 def read(root: Path) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return features and true labels of the moments of every demonstration of a pool."""
     pool = Pool.open(root)
-    videos = looks(pool.episodes, pool.fps, FrameSource((main_camera(pool),)), jobs=1)
+    videos = looks(pool.episodes, pool.fps, FrameSource((main_camera(pool),), RATE), jobs=1)
     columns = [index_from_spans(e.spans(), pool.subtasks, e.length) for e in pool.episodes]
     return [
         (video, np.asarray(column)[sampled_frames(len(column), len(video))])

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from filtering.baselines import BASELINES
+from filtering.decision import cut_of
 from filtering.segmentation.mstcn_folder import MSTCNFolder
 from filtering.thresholds import probability_incorrect
-from filtering.verdict import cut_of
 from filtering.weights.norm_score import score_steps
 from filtering.weights.steps import StepList, count_steps, steps_of_frames
 from teasim.pool.leakage import auroc

@@ -11,8 +11,8 @@ from safetensors.numpy import save as save_arrays
 
 from filtering.effects.reader import Effect, EffectReader
 from filtering.frame_features import FrameSource
-from filtering.pretrained import feature_recipe
-from teasim.errors import CheckpointError, ConfigError
+from filtering.pretrained import describe_fitted, feature_recipe
+from teasim.errors import ConfigError
 from teasim.pool.checkpoint import CheckpointKind
 
 EFFECTS = CheckpointKind("effects", 1, held="effect reader", remedy="fit again")
@@ -42,12 +42,7 @@ def load_effects(folder: Path) -> EffectReader:
         CheckpointError: `folder` holds none, one of another version or for other features, or a
             damaged one.
     """
-    description = EFFECTS.describe(folder)
-    if description.get("features") != feature_recipe():
-        raise CheckpointError(
-            f"'{EFFECTS.description_path(folder)}' was fitted to other features of a frame than "
-            "this program computes; fit again."
-        )
+    description = describe_fitted(EFFECTS, folder)
     weights = EFFECTS.weights(folder, description)
     try:
         return _reader(description, weights)

@@ -21,6 +21,7 @@ from scipy.special import expit
 from sklearn.covariance import ledoit_wolf
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from filtering.effects.rests import change_scales
 from filtering.frame_features import FrameSource
 from teasim.errors import ConfigError
 
@@ -32,8 +33,6 @@ OPPOSITE = -0.6
 """Cosine of what two sub-tasks change below which one of them undoes the other."""
 ERROR_FLOOR = 0.1
 """Least error of a reading; a few demonstrations cannot show that there is none."""
-CONSTANT = 0.1
-"""Least scale of a feature [of the median one]; what hardly ever changes must not become noise."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +152,7 @@ def find_effects(rests: Sequence[Array], subtasks: Sequence[Sequence[str]]) -> t
     names = _in_order(subtasks)
     alone = tuple(Effect(name, None) for name in names)
     changes, moves = _pairs(rests, [effect_states(alone, done) for done in subtasks])
-    traces = np.linalg.lstsq(moves, changes / _scales(changes), rcond=None)[0]
+    traces = np.linalg.lstsq(moves, changes / change_scales(changes), rcond=None)[0]
     traces /= np.maximum(np.linalg.norm(traces, axis=1, keepdims=True), 1e-12)
     likeness = traces @ traces.T
     opposite = likeness.argmin(axis=1)
@@ -207,7 +206,7 @@ def _certainties(right: NDArray[np.int64], count: int) -> Array:
 def _fit(rests: Sequence[Array], states: Sequence[Array]) -> Array:
     """Return the weights (E, F) of readings."""
     changes, moves = _pairs(rests, states)
-    scales = _scales(changes)
+    scales = change_scales(changes)
     # All that was ever seen to change lies in the span of the changes from the first rest.
     basis = np.linalg.svd(
         np.vstack([rows[1:] - rows[0] for rows in rests]) / scales, full_matrices=False
@@ -226,13 +225,6 @@ def _pairs(rests: Sequence[Array], states: Sequence[Array]) -> tuple[Array, Arra
     changes = [rows[j] - rows[i] for rows, (i, j) in zip(rests, earlier_later, strict=True)]
     moves = [rows[j] - rows[i] for rows, (i, j) in zip(states, earlier_later, strict=True)]
     return np.vstack(changes), np.vstack(moves)
-
-
-def _scales(changes: Array) -> Array:
-    """Return (F,) the scale of each feature's changes."""
-    scales = np.sqrt(np.square(changes).mean(axis=0))
-    typical = float(np.median(scales)) or float(scales.max()) or 1.0
-    return np.asarray(np.hypot(scales, CONSTANT * typical))
 
 
 def _in_order(subtasks: Sequence[Sequence[str]]) -> list[str]:

@@ -28,6 +28,8 @@ from teasim.pool import Episode, Span, VideoClip
 REST = 0.3
 """Moments up to this far from the border of two segments are averaged [s]. Not many: they help
 against noise only while the hands are away."""
+CONSTANT = 0.1
+"""Least scale of a feature [of the median one]; what hardly ever changes must not become noise."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,14 @@ def look_at_rests(
 def changes(rests: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (q, F): what each of q segments changed, from `rest_features` (q + 1, F)."""
     return np.diff(rests, axis=0)
+
+
+def change_scales(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (F,): the scale of each feature in changes (S, F), above 0 [root mean square]."""
+    scales = np.sqrt(np.square(rows).mean(axis=0))
+    varying = scales[scales > 0]
+    typical = float(np.median(varying)) if len(varying) else 1.0
+    return np.asarray(np.hypot(scales, CONSTANT * typical))
 
 
 def rest_moments(

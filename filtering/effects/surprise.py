@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from sklearn.covariance import ledoit_wolf
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from filtering.effects.rests import change_scales
+
 Array = NDArray[np.float64]
 
 COMPONENTS = 32
@@ -34,8 +36,6 @@ FEWEST_OTHERS = 2
 """With fewer other demonstrations that show a sub-task nobody knows what is usual."""
 FAR = 2.0
 """A change that is further off than this many medians counts as this far in the scatter C."""
-CONSTANT = 0.1
-"""Least scale of a feature [of the median one]; what hardly ever changes must not become noise."""
 
 
 def effect_surprises(changes: Sequence[Array], labels: Sequence[Sequence[int]]) -> list[Array]:
@@ -86,19 +86,7 @@ def effect_amounts(changes: Array, subtasks: NDArray[np.int64], demos: NDArray[n
 
 def _main_directions(changes: Array) -> Array:
     """Return changes (S, F), each feature in its scale over the pool, as (S, K); 0 stays 0."""
-    scales = np.sqrt((changes**2).mean(axis=0))
-    typical = (
-        float(
-            np.median(
-                scales[scales > 0],
-            )
-        )
-        if (scales > 0).any()
-        else 1.0
-    )
-    left, strength, _ = np.linalg.svd(
-        changes / np.hypot(scales, CONSTANT * typical), full_matrices=False
-    )
+    left, strength, _ = np.linalg.svd(changes / change_scales(changes), full_matrices=False)
     components: Array = (left * strength)[:, :COMPONENTS]
     return components
 

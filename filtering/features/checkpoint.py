@@ -22,8 +22,8 @@ from filtering.features.config import (
 )
 from filtering.features.generator import FeatureGenerator
 from filtering.features.learned import LearnedFeatures, LookConfig
-from filtering.pretrained import feature_recipe
-from teasim.errors import CheckpointError, ConfigError
+from filtering.pretrained import describe_fitted, feature_recipe
+from teasim.errors import ConfigError
 from teasim.pool.checkpoint import CheckpointKind
 
 BOTTLENECK = CheckpointKind("bottleneck", 1, held="trained bottleneck", remedy="train again")
@@ -93,12 +93,7 @@ def load_features(folder: Path) -> LearnedFeatures:
         CheckpointError: `folder` holds none, some of another version or for other feature maps, or
             damaged ones.
     """
-    description = GENERATOR.describe(folder)
-    if description.get("features") != feature_recipe():
-        raise CheckpointError(
-            f"'{GENERATOR.description_path(folder)}' was fitted to other feature maps than this "
-            "program computes; train again."
-        )
+    description = describe_fitted(GENERATOR, folder, "feature maps")
     weights = GENERATOR.weights(folder, description)
     bottleneck = load_bottleneck(folder)
     try:

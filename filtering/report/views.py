@@ -45,12 +45,12 @@ def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
         reason=fitted.reasons_[row],
         seconds=clock.time(length),
         segments=tuple(Segment(s.subtask, clock.time(s.start), clock.time(s.stop)) for s in spans),
-        marks=_marks(fitted.findings_[row], clock) if flagged else (),
+        marks=marks_of(fitted.findings_[row], clock) if flagged else (),
         video=video,
     )
 
 
-def _marks(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
+def marks_of(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
     """Mark what is missing and the gravest of the rest; echoes of those would only confuse."""
     if not findings:
         return ()
@@ -59,7 +59,9 @@ def _marks(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
 
 
 def _mark(finding: Finding, clock: Clock) -> Mark:
-    if finding.expected is None:
+    if finding.idle is not None:
+        text = f"nothing came of {finding.idle.subtask}"
+    elif finding.expected is None:
         text = "the end was expected"
     else:
         text = f"{finding.expected} {'is missing' if finding.missing else 'expected'}"

@@ -21,6 +21,9 @@ from teasim.pool import Episode, Pool
 
 AUTO = "auto"
 """Number of sub-tasks that means: find it out."""
+RATE = 5.0
+"""Moments looked at per second [Hz]; with half as many, short sub-tasks in videos without rests are
+joined to others, because each of them is seen as a row of stages."""
 AVERAGES = 112
 """Features of a camera that are used, the first of its block: averages of the stride-16 map."""
 
@@ -45,7 +48,7 @@ def clustering(
             f"The pool '{pool.root}' has {len(pool.episodes)} demonstrations; the segmenter "
             "'clustering' compares two or more."
         )
-    source = FrameSource(chosen_cameras(pool, cameras) or (main_camera(pool),))
+    source = FrameSource(chosen_cameras(pool, cameras) or (main_camera(pool),), RATE)
     # The order of the demonstrations in the pool must not matter, not even to rounding.
     order = sorted(range(len(pool.episodes)), key=lambda number: pool.episodes[number].demo_id)
     episodes = [pool.episodes[number] for number in order]

@@ -10,11 +10,11 @@ from safetensors.torch import load as load_tensors
 
 from filtering.determinism import seeded
 from filtering.frame_features import FrameSource
-from filtering.pretrained import feature_recipe
+from filtering.pretrained import describe_fitted, feature_recipe
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.scaling import SCALINGS
-from teasim.errors import CheckpointError, ConfigError
+from teasim.errors import ConfigError
 from teasim.pool.checkpoint import CheckpointKind
 
 SEGMENTER = CheckpointKind("segmenter", 1, held="segmenter", remedy="fit again")
@@ -46,12 +46,7 @@ def load_segmenter(folder: Path) -> MSTCNSegmenter:
         CheckpointError: `folder` holds no segmenter, one of another version or for other features,
             or a damaged one.
     """
-    description = SEGMENTER.describe(folder)
-    if description.get("features") != feature_recipe():
-        raise CheckpointError(
-            f"'{SEGMENTER.description_path(folder)}' was fitted to other features of a frame than "
-            "this program computes; fit again."
-        )
+    description = describe_fitted(SEGMENTER, folder)
     weights = SEGMENTER.weights(folder, description)
     try:
         return _segmenter(description, weights)

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.segmentation.mstcn_folder import MSTCNFolder, is_mstcn_folder
+from filtering.segmentation.mstcn_folder import PREDICTIONS, TRUTH, MSTCNFolder, is_mstcn_folder
 from filtering.segmentation.segments import Segmentation
 from teasim.errors import ConfigError, PoolError
 from teasim.pool import Pool, Span
@@ -106,7 +106,7 @@ class SequencePool:
         """Return a SHA-256 over the names and labels of all videos."""
         digest = hashlib.sha256("\n".join(self.subtasks).encode())
         for episode in self.episodes:
-            for folder in ("groundTruth", "predictions"):
+            for folder in (TRUTH, PREDICTIONS):
                 path = self.root / folder / f"{episode.demo_id}.txt"
                 digest.update(f"\n{folder} {episode.demo_id}\n".encode())
                 digest.update(path.read_bytes() if path.exists() else b"")

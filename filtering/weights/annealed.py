@@ -5,14 +5,27 @@ weights are then w_d = sigmoid((nu - l_d) / tau) with nu from sum w = M. tau goe
 demonstrations count alike) to small (the M most consistent ones count): one smooth path that starts
 at the whole pool's majority, where the plain problem has many local optima. The end of the path is
 hardened: the value is concave in w, so its least lies where all weights but one are 0 or 1.
+
+In a small pool without a clear majority the path may end beside the optimum. There the models of
+all pairs of demonstrations are starts as well, and the best end is improved by exchanges.
 """
+
+from itertools import combinations
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import expit
 
 from filtering.weights.problem import Multipliers, Problem
-from filtering.weights.solver import LEAST_GAIN, Array, Solution, Solver, concentrate, thinned
+from filtering.weights.solver import (
+    LEAST_GAIN,
+    Array,
+    Solution,
+    Solver,
+    concentrate,
+    fill,
+    thinned,
+)
 
 TAU_FIRST = 1.0
 """First temperature [nats per step]: well above the spread of the losses, w is nearly uniform."""
@@ -24,8 +37,12 @@ INNER_STEPS = 20
 """Most alternations between lambda and w at one temperature."""
 WEIGHT_TOLERANCE = 1e-3
 """Largest change of a weight at which a temperature counts as solved."""
-MOST_FOR_SWAPS = 32
-"""With so few different demonstrations, exchanges of two of them are tried at the end."""
+MOST_FOR_SEARCH = 32
+"""With so few different demonstrations, pairs are starts too and exchanges are tried at the end."""
+PAIRS = 8
+"""Pairs that are finished: those whose model fits its M best demonstrations best."""
+PAIR_PRECISION = 1e-2
+"""How precisely lambda is solved for to compare pairs."""
 MOST_FOR_PATH = 500
 """The path is walked with at most so many different demonstrations."""
 PATH_PRECISION = 1e-7
@@ -38,12 +55,18 @@ class Annealed(Solver):
     def solve_kinds(self, problem: Problem, sizes: Array, trusted: float) -> Solution:
         """Solve for K different demonstrations, `sizes` (K,) of each."""
         multipliers, solved = _walk(problem, sizes, trusted)
-        multipliers, weights, steps = concentrate(problem, sizes, trusted, multipliers)
-        solved += steps
-        if len(sizes) <= MOST_FOR_SWAPS:
+        small = len(sizes) <= MOST_FOR_SEARCH
+        starts, tried = _pairs(problem, sizes, trusted) if small else ([], 0)
+        ends = []
+        for start in [multipliers, *starts]:
+            multipliers, weights, steps = concentrate(problem, sizes, trusted, start)
+            ends.append((problem.objective(multipliers, weights), multipliers, weights))
+            solved += steps
+        _, multipliers, weights = min(ends, key=lambda end: end[0])
+        if small:
             multipliers, weights, steps = _swap(problem, sizes, trusted, multipliers, weights)
             solved += steps
-        return Solution(multipliers, weights, True, solved)
+        return Solution(multipliers, weights, True, solved + tried)
 
 
 def _walk(problem: Problem, sizes: Array, trusted: float) -> tuple[Multipliers, int]:
@@ -83,6 +106,19 @@ def _settle(
         if change < WEIGHT_TOLERANCE:
             break
     return multipliers, weights, step
+
+
+def _pairs(problem: Problem, sizes: Array, trusted: float) -> tuple[list[Multipliers], int]:
+    """Return lambda of the most promising pairs of demonstrations, and how many pairs there are."""
+    ends = []
+    for pair in combinations(range(len(sizes)), 2):
+        chosen = np.zeros(len(sizes))
+        chosen[list(pair)] = 1.0
+        multipliers = problem.solve(chosen, precision=PAIR_PRECISION)
+        losses = problem.demo_losses(multipliers)
+        ends.append((float(fill(losses, sizes, trusted) @ losses), multipliers))
+    best = sorted(ends, key=lambda end: end[0])[:PAIRS]
+    return [multipliers for _, multipliers in best], len(ends)
 
 
 def _swap(

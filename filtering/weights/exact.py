@@ -26,6 +26,8 @@ MOST = 24
 """Most different demonstrations; each one more may double the work."""
 TOLERANCE = 1e-6
 """How much the value may lie above the lower bound, if nothing else is asked [nats per step]."""
+PRECISION = 1e-3
+"""How precisely lambda is solved for, as a share of the tolerance; the bound allows for it."""
 NOTHING = 1e-9
 """Weights below this are the dust of floating-point sums."""
 
@@ -144,7 +146,7 @@ class _Search:
     def _value(self, weights: Array, start: Multipliers) -> tuple[float, float, Multipliers]:
         """Return H(v), a number that it is not below, and lambda."""
         self.solved += 1
-        multipliers = self.problem.solve(weights, start)
+        multipliers = self.problem.solve(weights, start, PRECISION * self.tolerance)
         value, slope = self.problem.value_and_slope(multipliers, weights)
         # A function whose curvature is at least the ridge is nowhere lower than this.
         least = value - float(np.sum(slope**2)) / (2 * self.problem.ridge)

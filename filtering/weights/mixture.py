@@ -84,14 +84,14 @@ def _climb(
     values: Array, weights: Array, share: NDArray[np.float64]
 ) -> tuple[Array, Array, Array, float]:
     """Run EM; return responsibilities (D,), probabilities (2, F), log-ratio (D,), likelihood."""
+    present, absent = weights * values, weights * (1 - values)
+    known = np.maximum(weights.max(axis=0), 1e-12)
     for _ in range(ITERATIONS):
         shares = np.stack([share, 1 - share])
         mixing = (shares.sum(axis=1) + SMOOTHING) / (len(share) + 2 * SMOOTHING)
-        yes, no = shares @ (weights * values), shares @ (weights * (1 - values))
-        known = np.maximum(weights.max(axis=0), 1e-12)
+        yes, no = shares @ present, shares @ absent
         probabilities = (yes / known + SMOOTHING) / ((yes + no) / known + 2 * SMOOTHING)
-        log_p = (weights * values) @ np.log(probabilities).T
-        log_p += (weights * (1 - values)) @ np.log(1 - probabilities).T
+        log_p = present @ np.log(probabilities).T + absent @ np.log(1 - probabilities).T
         log_joint = log_p + np.log(mixing)
         updated = expit(log_joint[:, 0] - log_joint[:, 1])
         done = np.abs(updated - share).max() < 1e-6

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit
 
+from filtering.kmeans import clusters
 from filtering.weights.mixture import find_populations
 from filtering.weights.steps import Array, StepCounts
 
@@ -48,6 +49,8 @@ class NormScore:
     """(D,) l_d [nats], higher is worse."""
     trust: Array
     """(D,) w: how much each demonstration shapes the norm, in [0, 1]."""
+    usual: Array
+    """(D, T) max(0, z_a): what leaving a sub-task out would add [nats]."""
     omitted: Array
     """(D, T) what each left-out sub-task adds [nats]."""
     misplaced: Array
@@ -63,8 +66,20 @@ class NormScore:
     lack: Array
     """(T,) how much rarer each sub-task is in the other population [probability]."""
 
+    @property
+    def left_out(self) -> Array:
+        """(D,) what steps that are not there add [nats]."""
+        return np.asarray(self.omitted.sum(axis=1) + self.systematic)
 
-def score_steps(counts: StepCounts, seed: int = 0, tolerance: float = 0.0) -> NormScore:
+    @property
+    def out_of_order(self) -> Array:
+        """(D,) what the order of the steps adds [nats]."""
+        return np.asarray(self.precedence + TRANSITION * self.transition)
+
+
+def score_steps(
+    counts: StepCounts, seed: int = 0, tolerance: float = 0.0, n_groups: int = 2
+) -> NormScore:
     """Score the demonstrations of a pool.
 
     Args:
@@ -72,12 +87,13 @@ def score_steps(counts: StepCounts, seed: int = 0, tolerance: float = 0.0) -> No
         seed: draws the starts of the mixture.
         tolerance: b in [0, 1): w becomes (1 - b) w + b, so that what a minority does is less of a
             surprise; about 0.2 spares legal orders that a few share.
+        n_groups: clusters of sqrt(l) for the refit, 2 or 3; the lowest is trusted.
     """
     populations = find_populations(counts, seed)
     first = _score(counts, populations.norm)
     trimmed = _trim(first.losses)
     second = _score(counts, trimmed)
-    trust = (1 - tolerance) * _refit(second.losses, trimmed) + tolerance
+    trust = (1 - tolerance) * _refit(second.losses, trimmed, n_groups) + tolerance
     final = _score(counts, trust)
     systematic = np.clip(populations.lack - 1, 0, 1) * np.clip(
         populations.log_ratio, 0, LARGEST_RATIO
@@ -91,7 +107,8 @@ def score_steps(counts: StepCounts, seed: int = 0, tolerance: float = 0.0) -> No
 
 
 def _score(counts: StepCounts, trust: Array) -> NormScore:
-    omitted = (1 - counts.occurs) * np.maximum(_log_odds(counts.occurs, 1.0, trust), 0)
+    usual = np.maximum(_log_odds(counts.occurs, 1.0, trust), 0)
+    omitted = (1 - counts.occurs) * usual
     order = np.maximum(_log_odds(counts.before, counts.both, trust), 0) * counts.binding
     misplaced = order * (1 - counts.before) * counts.both
     broken = misplaced.reshape(counts.n_demos, -1)
@@ -101,6 +118,7 @@ def _score(counts: StepCounts, trust: Array) -> NormScore:
     return NormScore(
         losses=omitted.sum(axis=1) + precedence + TRANSITION * transition,
         trust=trust,
+        usual=usual,
         omitted=omitted,
         misplaced=misplaced,
         precedence=precedence,
@@ -142,39 +160,14 @@ def _trim(losses: Array) -> Array:
     return np.asarray(expit((centre - losses) / tau))
 
 
-def _refit(losses: Array, trimmed: Array) -> Array:
-    """Trust all that are near to the better half: the lower of two clusters of sqrt(l)."""
-    low, high = near_and_far(losses)
-    if not len(high):
+def _refit(losses: Array, trimmed: Array, count: int) -> Array:
+    """Trust all that are near to the better half: the lowest of the clusters of sqrt(l)."""
+    roots = np.sqrt(losses)
+    low, *higher = clusters(roots, count)
+    if not higher:
         return trimmed
-    middle = (low.mean() + high.mean()) / 2
-    residuals = np.concatenate([low - low.mean(), high - high.mean()])
+    middle = (low.mean() + higher[0].mean()) / 2
+    residuals = np.concatenate([c - c.mean() for c in (low, *higher)])
     spread = max(0.5 * float(residuals.std()), 1e-3)
-    trust = np.asarray(expit((middle - _roots(losses)) / spread))
-    return trust if trust.sum() >= len(losses) / 2 else trimmed
-
-
-def near_and_far(losses: Array) -> tuple[Array, Array]:
-    """Return sqrt(l) of the lower and of the upper cluster; the upper one may be empty."""
-    roots = _roots(losses)
-    edge = two_means(roots)
-    return roots[roots <= edge], roots[roots > edge]
-
-
-def _roots(losses: Array) -> Array:
-    return np.asarray(np.sqrt(np.maximum(losses, 0)))
-
-
-def two_means(values: Array) -> float:
-    """Largest value of the lower cluster in the exact two-means split of `values` (n,)."""
-    ordered = np.sort(values)
-    splits = {
-        k: _within(ordered[:k]) + _within(ordered[k:])
-        for k in range(1, len(ordered))
-        if ordered[k] > ordered[k - 1]
-    }
-    return float(ordered[min(splits, key=splits.__getitem__) - 1 if splits else -1])
-
-
-def _within(values: Array) -> float:
-    return float(((values - values.mean()) ** 2).sum())
+    trust = np.asarray(expit((middle - roots) / spread))
+    return trust if trust.sum() >= len(losses) / count else trimmed

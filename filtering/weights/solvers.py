@@ -8,7 +8,7 @@ from filtering.weights.annealed import Annealed
 from filtering.weights.exact import Exact
 from filtering.weights.published import Published
 from filtering.weights.solver import Solver
-from teasim.errors import ConfigError
+from teasim.errors import named
 
 SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
     {"annealed": Annealed, "alternating": Alternating, "exact": Exact, "published": Published}
@@ -21,6 +21,4 @@ def solver_named(name: str) -> Solver:
     Raises:
         ConfigError: there is no solver of that name.
     """
-    if name not in SOLVERS:
-        raise ConfigError(f"Unknown solver '{name}'; choose {', '.join(SOLVERS)}.")
-    return SOLVERS[name]()
+    return named("solver", SOLVERS, name)()

@@ -90,23 +90,38 @@ def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
         n_subtasks: T, one more than the largest label that may occur.
     """
     shape = (len(demos), n_subtasks, n_subtasks)
-    occurs, before = np.zeros(shape[:2]), np.zeros(shape)
-    follows = np.zeros((len(demos), n_subtasks + 1, n_subtasks + 1))
-    for d, demo in enumerate(demos):
-        occurs[d, list(demo.labels)] = 1.0
-        before[d] = _precedence(demo, n_subtasks)
-        path = [n_subtasks, *demo.labels, n_subtasks]
-        np.add.at(follows[d], (path[:-1], path[1:]), 1.0)
+    owners = np.repeat(np.arange(len(demos)), [len(demo.labels) for demo in demos])
+    labels = np.array([label for demo in demos for label in demo.labels], dtype=np.int64)
+    lengths = np.array([length for demo in demos for length in demo.lengths], dtype=np.float64)
+    occurs = np.zeros(shape[:2])
+    occurs[owners, labels] = 1.0
     both = occurs[:, :, None] * occurs[:, None, :] * (1 - np.eye(n_subtasks))
+    before = _precedence(owners, labels, lengths, shape[:2])
+    follows = _transitions(demos, n_subtasks)
     return StepCounts(occurs, before * both, both, follows, np.ones(shape[1:]))
 
 
-def _precedence(demo: StepList, n_subtasks: int) -> Array:
-    """Return (T, T): share of frame pairs with the row's sub-task before the column's."""
-    frames = np.zeros((len(demo.labels), n_subtasks))
-    frames[np.arange(len(demo.labels)), list(demo.labels)] = demo.lengths
-    earlier = np.vstack([np.zeros(n_subtasks), np.cumsum(frames, axis=0)[:-1]])
-    pairs = earlier.T @ frames
-    total = frames.sum(axis=0)
-    possible = np.outer(total, total)
+def _precedence(
+    owners: NDArray[np.int64], labels: NDArray[np.int64], lengths: Array, shape: tuple[int, int]
+) -> Array:
+    """Return (D, T, T): share of frame pairs with the row's sub-task before the column's."""
+    frames = np.zeros((len(labels), shape[1]))
+    frames[np.arange(len(labels)), labels] = lengths
+    total = np.zeros(shape)
+    np.add.at(total, (owners, labels), lengths)
+    # Frames of each sub-task before a segment: in the whole pool, less those in earlier ones.
+    earlier = np.cumsum(frames, axis=0) - frames - (np.cumsum(total, axis=0) - total)[owners]
+    pairs = np.zeros((*shape, shape[1]))
+    np.add.at(pairs.transpose(0, 2, 1), (owners, labels), earlier * lengths[:, None])
+    possible = total[:, :, None] * total[:, None, :]
     return np.divide(pairs, possible, out=np.zeros_like(pairs), where=possible > 0)
+
+
+def _transitions(demos: Sequence[StepList], n_subtasks: int) -> Array:
+    """Return (D, T + 1, T + 1): how often the column's sub-task comes right after the row's."""
+    follows = np.zeros((len(demos), n_subtasks + 1, n_subtasks + 1))
+    owners = np.repeat(np.arange(len(demos)), [len(demo.labels) + 1 for demo in demos])
+    sources = np.array([label for demo in demos for label in (n_subtasks, *demo.labels)])
+    targets = np.array([label for demo in demos for label in (*demo.labels, n_subtasks)])
+    np.add.at(follows, (owners, sources, targets), 1.0)
+    return follows

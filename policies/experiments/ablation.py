@@ -8,6 +8,7 @@ stopped. The verdicts of a pool are read for the use `labels` alone.
 import csv
 import io
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from filtering.demo_filter import DemoFilter
 from policies.base import DecisionSamples
 from policies.demos import DemosConfig, load_decisions
-from policies.evaluation import MODES, EvaluationConfig, Scores, evaluate, score
+from policies.evaluation import MODES, Scores, World, play, score, worlds
 from policies.experiments.ablation_config import LABELS, AblationConfig, FilterVariant
 from policies.learners import find_learner
 from policies.results import as_json
@@ -60,8 +61,10 @@ def run_ablation(config: AblationConfig, out: Path, *, jobs: int) -> str:
         PoolError: a pool is missing or damaged.
     """
     claim(config, out)
-    for path in config.pools:
-        _run_pool(config, path, out, jobs)
+    todo = [each for path in config.pools for each in _todo(config, path, out, jobs)]
+    shares = [todo[first::jobs] for first in range(min(jobs, len(todo)))]
+    run = partial(_run_cells, config=config, out=out)
+    parallel.run(run, shares, jobs=jobs, description="policies")
     cells = {cell: _read(cell.path(out)) for cell in all_cells(config)}
     write_text(out / "results.csv", as_csv(cells))
     table = as_markdown(config, cells)
@@ -169,10 +172,7 @@ def _hits(found: list[Scores]) -> list[tuple[int, int]]:
     """Correct and all actions per scene, over the training seeds: a scene is what is paired."""
     scenes = zip(*(s.episodes for s in found), strict=True)
     return [
-        (
-            sum(action.correct for episode in scene for action in episode.actions),
-            sum(len(episode.actions) for episode in scene),
-        )
+        (sum(episode.n_correct for episode in scene), sum(len(e.actions) for e in scene))
         for scene in scenes
     ]
 
@@ -190,12 +190,24 @@ def _cells_of(config: AblationConfig, pool: Path) -> list[Cell]:
     ]
 
 
-def _run_pool(config: AblationConfig, path: Path, out: Path, jobs: int) -> None:
-    todo = [cell for cell in _cells_of(config, path) if not cell.path(out).is_file()]
-    if not todo:
-        return
+@dataclass(frozen=True)
+class Todo:
+    """A cell that is still to be done, and what its policy learns from."""
+
+    cell: Cell
+    samples: DecisionSamples
+    weights: NDArray[np.float64]
+    """(D,)"""
+    experts: tuple[int, ...]
+
+
+def _todo(config: AblationConfig, path: Path, out: Path, jobs: int) -> list[Todo]:
+    """Look at the pool at `path`; return its cells that have no scores yet."""
+    cells = [cell for cell in _cells_of(config, path) if not cell.path(out).is_file()]
+    if not cells:
+        return []
     pool = Pool.open(path)
-    wanted = {cell.filter for cell in todo}
+    wanted = {cell.filter for cell in cells}
     weights = {
         variant.name: chosen_weights(pool, variant, out, jobs)
         for variant in config.filters
@@ -203,26 +215,25 @@ def _run_pool(config: AblationConfig, path: Path, out: Path, jobs: int) -> None:
     }
     samples = load_decisions(pool, DemosConfig(observe=config.observe), jobs=jobs)
     experts = places_of(pool, config.expert)
-    run = partial(_run_cell, config=config, samples=samples, experts=experts, out=out)
-    work = [(cell, weights[cell.filter]) for cell in todo]
-    parallel.run(run, work, jobs=jobs, description=f"policies of {path.name}")
+    return [Todo(cell, samples, weights[cell.filter], experts) for cell in cells]
 
 
-def _run_cell(
-    work: tuple[Cell, NDArray[np.float64]],
-    *,
-    config: AblationConfig,
-    samples: DecisionSamples,
-    experts: tuple[int, ...],
-    out: Path,
-) -> None:
+def _run_cells(work: Sequence[Todo], *, config: AblationConfig, out: Path) -> None:
+    """Train and try out policies one after the other; what they do alike is simulated once."""
+    with worlds(EnvironmentConfig(config.env_id, max_actions=config.max_actions)) as world:
+        for todo in work:
+            _run_cell(todo, world, config, out)
+
+
+def _run_cell(todo: Todo, world: World, config: AblationConfig, out: Path) -> None:
     """Train one policy, try it out, keep its scores."""
-    cell, weights = work
+    cell, weights = todo.cell, todo.weights
     kind = find_learner(cell.learner, "subtask")
-    settings: dict[str, Any] = {"experts": experts} if kind.takes_experts else {}
-    policy = kind.make(seed=cell.seed, **settings).fit(samples, weights).policy_
-    world = EnvironmentConfig(config.env_id, max_actions=config.max_actions)
-    scores = evaluate(policy, EvaluationConfig(config.episodes, config.first_seed, world))
+    settings: dict[str, Any] = {"experts": todo.experts} if kind.takes_experts else {}
+    policy = kind.make(seed=cell.seed, **settings).fit(todo.samples, weights).policy_
+    seeds = range(config.first_seed, config.first_seed + config.episodes)
+    played = play(world(policy.spec), policy, seeds)
+    scores = {mode: score(mode, played[mode], policy.action_names) for mode in MODES}
     record = {**asdict(cell), "actions": policy.action_names, "weights": weights.tolist()}
     write_json(cell.path(out), record | {"scores": as_json(scores)})
 

@@ -23,7 +23,7 @@ from policies.base import DecisionSamples
 from policies.bc import BC, BCConfig
 from policies.checkpoint import save_policy
 from policies.demos import load_decisions
-from policies.evaluation import EvaluationConfig, Scores, evaluate
+from policies.evaluation import EvaluationConfig, Scores, evaluate_all
 from policies.experiments.score_section import score_section, sentences
 from policies.results import as_json
 from policies.results import summary as rates
@@ -121,7 +121,8 @@ def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
     policies = train_policies(pool, out / "filter" / "weights.csv", out / "policies", config, jobs)
     watch.lap("train")
     trial = EvaluationConfig(episodes=config.episodes, environment=config.environment)
-    scores = {name: evaluate(policy, trial, jobs=jobs) for name, policy in policies.items()}
+    found = evaluate_all(list(policies.values()), trial, jobs=jobs)
+    scores = dict(zip(policies, found, strict=True))
     watch.lap("evaluate")
     findings = Findings(
         tuple(row.episode_index for row in fitted.table() if row.flagged),

@@ -15,7 +15,7 @@ from teasim.constants import (
     GRIPPER_SQUEEZE,
     STATE_NAMES,
 )
-from teasim.errors import ConfigError
+from teasim.errors import ConfigError, named
 from teasim.world.yumi import JOINT_SPEEDS
 
 DELTA_SHARE = 0.85
@@ -77,9 +77,7 @@ def make_control(name: str, model: mujoco.MjModel) -> Control:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in CONTROLS:
-        raise ConfigError(f"Unknown control '{name}'; choose {', '.join(CONTROLS)}.")
-    return CONTROLS[name](model)
+    return named("control", CONTROLS, name)(model)
 
 
 def check_action(action: object) -> np.ndarray:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from teasim.errors import ConfigError
+from teasim.errors import named
 from teasim.generate.config import GenerateConfig
 
 PRESETS: Mapping[str, Mapping[str, GenerateConfig]] = MappingProxyType(
@@ -25,6 +25,4 @@ def find_preset(name: str) -> Mapping[str, GenerateConfig]:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in PRESETS:
-        raise ConfigError(f"Unknown preset '{name}'; choose {', '.join(PRESETS)}.")
-    return PRESETS[name]
+    return named("preset", PRESETS, name)

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from teasim.errors import ConfigError
+from teasim.errors import ConfigError, named
 from teasim.task.recipes import CRITICAL, POURED, PRECEDENCE, check_subtask, recognisable
 
 Manner = Literal["well", "ineffective", "abandoned"]
@@ -184,9 +184,7 @@ def mistake(name: str) -> Mistake:
     Raises:
         ConfigError: there is none of that name.
     """
-    if name not in MISTAKES:
-        raise ConfigError(f"Unknown mistake '{name}'; choose {', '.join(MISTAKES)}.")
-    return MISTAKES[name]
+    return named("mistake", MISTAKES, name)
 
 
 def spoil(plan: Plan, spec: str, rng: np.random.Generator) -> Plan:

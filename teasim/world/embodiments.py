@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARM_JOINTS
-from teasim.errors import ConfigError
+from teasim.errors import named
 from teasim.world.person import (
     HAND_JOINTS,
     HAND_RANGE,
@@ -103,6 +103,4 @@ def find_embodiment(name: str) -> Embodiment:
     Raises:
         ConfigError: there is none.
     """
-    if name not in EMBODIMENTS:
-        raise ConfigError(f"Unknown embodiment '{name}'; choose {', '.join(EMBODIMENTS)}.")
-    return EMBODIMENTS[name]
+    return named("embodiment", EMBODIMENTS, name)

@@ -91,7 +91,9 @@ def test_a_verb_never_sees_debug(capsys):
 def test_an_unknown_verb_is_named_with_the_choices(capsys):
     assert main(["mystery"]) == 2
     error = capsys.readouterr().err
-    assert error.startswith("teasim: unknown verb 'mystery'; choose bad-pool, broken, bug, ")
+    assert error.startswith(
+        "teasim: unknown verb 'mystery'; choose ablate, bad-pool, broken, bug, "
+    )
     assert error.count("\n") == 1
     assert "doctor" in error
 

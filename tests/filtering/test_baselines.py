@@ -32,7 +32,7 @@ def test_losses_are_finite_and_permute_with_the_pool(
     assert permuted == pytest.approx(losses[order], abs=1e-6)
 
 
-@pytest.mark.parametrize("name", set(BASELINES) - {"random"})
+@pytest.mark.parametrize("name", [name for name in BASELINES if name != "random"])
 def test_an_omission_stands_out(name: str) -> None:
     losses = BASELINES[name]([FULL] * 8 + [SHORT])
     assert losses[8] > losses[:8].max()

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from filtering.decision import SMALLEST_CUT
 from filtering.explain import Finding
 from filtering.findings import Places, find_departures, find_surprises, usual_order
 from filtering.sequence import transitions
-from filtering.verdict import SMALLEST_CUT, Evidence
+from filtering.verdict import Evidence
 from filtering.weights.norm_score import score_steps
 from filtering.weights.score import Score
 from teasim.pool import Span

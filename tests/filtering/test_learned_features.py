@@ -111,14 +111,17 @@ def test_features_that_are_not_there_are_refused_with_the_choices(folder, toy_po
         "Unknown features 'ranked'; choose pooled or the folder of a segmenter that "
         "`teasim segment fit --features` made."
     )
+    with pytest.raises(ConfigError) as unused:
+        FilterConfig(features=str(tmp_path))
+    assert str(unused.value) == "The score 'norm' takes no features; choose equation3."
     with pytest.raises(CheckpointError) as missing:
-        DemoFilter(FilterConfig(features=str(tmp_path))).fit(toy_pool)
+        DemoFilter(FilterConfig(features=str(tmp_path), score="equation3")).fit(toy_pool)
     assert str(missing.value) == (
         f"'{tmp_path}' holds no learned features: generator.json cannot be read."
     )
     sideways = make_toy_pool(tmp_path / "p", [toy_pool.subtasks] * 3, size=16, cameras=("left",))
     with pytest.raises(ConfigError) as other:
-        DemoFilter(FilterConfig(features=str(folder))).fit(sideways)
+        DemoFilter(FilterConfig(features=str(folder), score="equation3")).fit(sideways)
     assert str(other.value) == (
         "The features were learned from the camera 'cup', which the pool "
         f"'{sideways.root}' lacks; it has left."

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filtering.weights.mixture import find_populations
-from filtering.weights.norm_score import score_steps, two_means
+from filtering.weights.norm_score import score_steps
 from filtering.weights.steps import StepList, count_steps, steps_of_frames
 from teasim.pool.leakage import auroc
 
@@ -94,17 +94,6 @@ def test_a_short_spurious_segment_says_little():
     moved = StepList((0, 5, 1, 2, 3, 4, 6), (10,) * 7)
     losses = score_steps(count_steps([*clean, blip, moved], T)).losses
     assert losses[8] < 2.0 < losses[9]
-
-
-@given(values=st.lists(st.integers(0, 20), min_size=1, max_size=12))
-def test_two_means_is_the_best_split(values):
-    cut = two_means(np.array(values, dtype=float))
-
-    def within(edge):
-        parts = [np.array([v for v in values if (v <= edge) == low]) for low in (True, False)]
-        return sum(((part - part.mean()) ** 2).sum() for part in parts if len(part))
-
-    assert within(cut) == pytest.approx(min(within(edge) for edge in values))
 
 
 def test_counts_are_what_they_say():

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from filtering.decision import cut_of
 from filtering.demo_filter import DemoFilter, FilterConfig
 from filtering.segmentation.mstcn_folder import write_predictions
 from filtering.segmentation.sequence_pool import SequencePool
-from filtering.verdict import cut_of
 from filtering.weights.norm_score import score_steps
 from filtering.weights.precedence import precedence_graph, read_precedence
 from filtering.weights.steps import StepList, count_steps

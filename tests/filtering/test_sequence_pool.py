@@ -44,6 +44,27 @@ def run(folder: Path, out: Path, *extra: str) -> int:
     return main([str(folder), "-o", str(out), *extra])
 
 
+@pytest.mark.parametrize(("count", "majority"), [(3, 2), (4, 3), (5, None)])
+def test_a_few_demonstrations_come_with_a_caution(
+    count: int, majority: int | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels = {f"v{k}": FULL for k in range(count)}
+    posteriors = {name: np.full((len(FULL), 7), 1 / 7, np.float32) for name in labels}
+    write_predictions(tmp_path / "few", SEQ_1, labels, labels, posteriors)
+    assert run(tmp_path / "few", tmp_path / "out") == 0
+    printed = capsys.readouterr().out.splitlines()
+    told = json.loads((tmp_path / "out" / "filter.json").read_text())["caution"]
+    if majority is None:
+        assert told is None
+        assert not any("majority" in line for line in printed)
+        return
+    assert told == (
+        f"With {count} demonstrations a majority is {majority}: a mistake that 2 of them share "
+        "cannot be told from what is usual, and even that of a single one may not be flagged."
+    )
+    assert told in printed
+
+
 @pytest.mark.parametrize(("source", "wrong"), [("truth", ["v2"]), ("predictions", ["v2", "v4"])])
 def test_a_folder_of_labels_is_filtered(
     folder: Path, tmp_path: Path, source: str, wrong: list[str], capsys: pytest.CaptureFixture[str]

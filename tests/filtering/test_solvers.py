@@ -143,6 +143,17 @@ def test_small_pools_are_solved_to_the_certified_optimum(name: str) -> None:
         assert fitted(name, noisy(seed), 3.0).objective_ - bound < 1e-3
 
 
+@pytest.mark.parametrize("seed", [0, 6])
+def test_annealed_reaches_the_optimum_where_there_is_no_majority(seed: int) -> None:
+    """Random steps of random looks; with seed 6 the path alone ends beside the optimum."""
+    rng = np.random.default_rng(seed)
+    orders = [rng.integers(0, 3, size=n).tolist() for n in rng.integers(1, 6, size=8)]
+    states = [rng.normal(size=(len(steps), 2)) for steps in orders]
+    problem = Problem(transitions(states, orders, 3), ridge=0.01)
+    certified = Exact(1e-4).fit(problem, 4.0)
+    assert Annealed().fit(problem, 4.0).objective_ - certified.lower_bound_ < 1e-3
+
+
 def test_alternating_starts_differ_by_seed_and_end_alike() -> None:
     problem = noisy(4)
     first, other = Alternating(seed=0).fit(problem, 3.0), Alternating(seed=1).fit(problem, 3.0)

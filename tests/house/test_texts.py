@@ -16,7 +16,14 @@ README = (ROOT / "README.md").read_text()
 VERBS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][
     "teasim.verbs"
 ]
-MARKDOWN = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/results.md"]
+MARKDOWN = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "docs/results.md",
+    "docs/ci.md",
+    "docs/policies.md",
+]
 SCRIPTS = ["scripts/setup", "scripts/test", "scripts/demo", ".ci/run"]
 TEXTS = {".py", ".md", ".toml", ".xml", ".html", ".j2", ".css", ".js", ".yml", ".yaml", ".lock", ""}
 

@@ -5,7 +5,7 @@ import pytest
 
 from policies.base import DecisionSamples, ObservationSpec
 from policies.demos import DemosConfig, load_decisions
-from policies.motions import MotionSamples
+from policies.joint.motions import MotionSamples
 from tests.policies.fake_joints import make_joint_pool
 from tests.policies.fakes import SEQ_1, make_fake_pool
 

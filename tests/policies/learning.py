@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from policies.joint.motions import MotionSamples
 from policies.learners import LEARNERS
-from policies.motions import MotionSamples
 
 QUICK = {
-    "bc-chunk": {"steps": 60, "hidden": 32, "chunk": 3, "batch": 32},
+    "nearest": {"chunk": 3},
     "bcnd": {"members": 2, "rounds": 2},
     "demodice": {"experts": (0, 1), "ratio_steps": 60},
 }

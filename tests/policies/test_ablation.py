@@ -93,7 +93,7 @@ def test_what_is_there_is_not_done_again(folder, done, monkeypatch):
     ran = []
     real = ablation._run_cell
     monkeypatch.setattr(
-        ablation, "_run_cell", lambda work, **rest: ran.append(work[0]) or real(work, **rest)
+        ablation, "_run_cell", lambda todo, *rest: ran.append(todo.cell) or real(todo, *rest)
     )
     ablate([str(folder / "plan.toml"), "-o", str(done), "--jobs", "1"])
     assert [(cell.filter, cell.learner, cell.seed) for cell in ran] == [("all", "bc", 1)]

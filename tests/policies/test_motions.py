@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from policies.cli import train
-from policies.motions import load_motions, one_sign, seen_numbers
+from policies.joint.motions import load_motions, one_sign, seen_numbers
 from teasim.cli.main import main
 from teasim.constants import STATE_NAMES
 from teasim.errors import ConfigError
@@ -56,7 +56,7 @@ def test_a_target_for_every_joint(joint_pool, monkeypatch):
 
 
 def test_a_pool_without_a_joint_log_is_exit_code_2_and_a_sentence(human_pool, tmp_path, capsys):
-    options = ["--learner", "bc-chunk", "--level", "joint", "-o", str(tmp_path / "run")]
+    options = ["--learner", "nearest", "--level", "joint", "-o", str(tmp_path / "run")]
     assert main(["train", str(human_pool.root), *options, "--jobs", "1"]) == 2
     said = (
         f"'{human_pool.root}' has no joint log, so there is no motion to learn from it; "

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from policies.motion_policy import MotionPolicy
+from policies.joint.policy import MotionPolicy
 from teasim.errors import CheckpointError
 
 JOINT_ENVIRONMENT = "teasim:teasim/TeaMaking-v0"

@@ -1,20 +1,17 @@
 """A joint-level policy is trained, plays, and gets the scores that physics gives it."""
 
 import json
-from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from policies.base import ObservationSpec
-from policies.bc_chunk import BCChunkConfig
 from policies.checkpoint import load_policy
 from policies.cli import evaluate, train
 from policies.evaluation import EvaluationConfig
-from policies.learners import LEARNERS
-from policies.motion_evaluation import evaluate_motion, score_motion
-from policies.motion_results import mean_done, motion_summary
-from policies.motion_rollout import JOINT_ENVIRONMENT, PATIENCE, MotionEpisode, run_motion
+from policies.joint.evaluation import evaluate_motion, score_motion
+from policies.joint.results import mean_done, motion_summary
+from policies.joint.rollout import JOINT_ENVIRONMENT, PATIENCE, MotionEpisode, run_motion
 from policies.rollout import make_environment
 from policies.statistics import rate
 from teasim.constants import SUBTASKS
@@ -23,23 +20,11 @@ from tests.policies.fake_joints import FAKE_JOINTS, FAKE_JOINTS_ID
 from tests.policies.fakes import SEQ_1
 
 
-@dataclass(frozen=True)
-class Quick(BCChunkConfig):
-    """Enough for the fake joints."""
-
-    chunk: int = 6
-    hidden: int = 64
-    steps: int = 400
-    batch: int = 64
-
-
 @pytest.fixture(scope="module")
 def run(joint_pool, tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "joints"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(LEARNERS, "bc-chunk", replace(LEARNERS["bc-chunk"], config=Quick))
-        options = ["--learner", "bc-chunk", "--level", "joint", "-o", str(folder), "--jobs", "1"]
-        assert train([str(joint_pool.root), *options]) == 0
+    options = ["--learner", "nearest", "--level", "joint", "-o", str(folder), "--jobs", "1"]
+    assert train([str(joint_pool.root), *options]) == 0
     return folder
 
 

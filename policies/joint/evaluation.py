@@ -10,8 +10,8 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from policies.evaluation import EPISODES_PER_BATCH, MODES, SPILL, EvaluationConfig
-from policies.motion_policy import MotionPolicy
-from policies.motion_rollout import MotionEpisode, run_motion
+from policies.joint.policy import MotionPolicy
+from policies.joint.rollout import MotionEpisode, run_motion
 from policies.networks import one_thread
 from policies.rollout import EnvironmentConfig, make_environment
 from policies.statistics import Rate, grouped_rate, rate

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from policies.motion_evaluation import MotionScores
+from policies.joint.evaluation import MotionScores
 from policies.results import rate_json
 
 
