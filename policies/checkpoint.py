@@ -1,7 +1,7 @@
 """Save and load a policy: RUN/policy.safetensors (weights) and RUN/policy.json (what they are)."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +10,37 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
 from policies.base import ObservationSpec
+from policies.joint.memory import Memory, MemoryShape
+from policies.joint.policy import MotionPolicy
 from policies.networks import DecisionNetwork, Ensemble, NetworkShape, RecurrentNetwork
 from policies.subtask_policy import SubtaskPolicy
 from teasim.pool.checkpoint import CheckpointKind
 
 POLICY = CheckpointKind("policy", 2, held="trained policy", remedy="train again")
 
-NETWORKS = {network.kind: network for network in (DecisionNetwork, Ensemble, RecurrentNetwork)}
+
+@dataclass(frozen=True)
+class Kind:
+    """What is built from a description."""
+
+    network: type[Any]
+    shape: type[Any]
+    policy: type[Any]
+
+
+KINDS = {
+    **{
+        network.kind: Kind(network, NetworkShape, SubtaskPolicy)
+        for network in (DecisionNetwork, Ensemble, RecurrentNetwork)
+    },
+    Memory.kind: Kind(Memory, MemoryShape, MotionPolicy),
+}
 """The networks a policy may have, by the name they are saved under."""
 
 
-def save_policy(policy: SubtaskPolicy, run: Path, *, training: Mapping[str, Any]) -> None:
+def save_policy(
+    policy: SubtaskPolicy | MotionPolicy, run: Path, *, training: Mapping[str, Any]
+) -> None:
     """Write `policy` into the folder `run`; `training` (JSON-able) says how it came about."""
     description = {
         "observation": asdict(policy.spec),
@@ -33,7 +53,7 @@ def save_policy(policy: SubtaskPolicy, run: Path, *, training: Mapping[str, Any]
     POLICY.save(run, save_tensors(policy.network.state_dict()), description)
 
 
-def load_policy(run: Path) -> SubtaskPolicy:
+def load_policy(run: Path) -> SubtaskPolicy | MotionPolicy:
     """Read a policy that `save_policy` wrote.
 
     Raises:
@@ -44,15 +64,16 @@ def load_policy(run: Path) -> SubtaskPolicy:
     try:
         spec = _spec(description["observation"])
         actions = tuple(str(name) for name in description["actions"])
-        make = NETWORKS[description["kind"]]
-        shape = NetworkShape(**description["network"])
-        network = make(shape, seed=0, **description["settings"])
+        kind = KINDS[description["kind"]]
+        shape = kind.shape(**description["network"])
+        network = kind.network(shape, seed=0, **description["settings"])
         if network.shape.actions != len(actions):
             raise ValueError("one action per output")
         network.load_state_dict(load_tensors(weights))
     except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
         raise POLICY.mismatch(run) from error
-    return SubtaskPolicy(network, spec, actions)
+    policy: SubtaskPolicy | MotionPolicy = kind.policy(network, spec, actions)
+    return policy
 
 
 def _spec(fields: Mapping[str, Any]) -> ObservationSpec:

@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from teasim.parallel import default_jobs
+
+if TYPE_CHECKING:
+    from policies.joint.policy import MotionPolicy
+    from policies.subtask_policy import SubtaskPolicy
 
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 
@@ -26,9 +30,9 @@ class TrainOptions:
     """New folder for the policy."""
     learner: str = "bc"
     """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (against wrong
-    demonstrations)."""
+    demonstrations); nearest at the level joint."""
     level: str = "subtask"
-    """What is chosen: subtask."""
+    """What is decided: subtask (which comes next) or joint (where the joints go; nearest)."""
     weights: Path | None = None
     """Weight table (weights.csv of `teasim filter`)."""
     use: str | None = None
@@ -65,12 +69,16 @@ class EvaluateOptions:
     """File for a build server."""
     video: Path | None = None
     """Folder for what the policy saw, one frame per decision with the choice written below it."""
-    env_id: str = "teasim:teasim/TeaMakingSubtasks-v0"
-    """Gymnasium id of the environment."""
+    env_id: str | None = None
+    """Gymnasium id of the environment; default: TeaMakingSubtasks-v0 for a policy over sub-tasks,
+    TeaMaking-v0 for one over joints."""
+    randomize: bool = True
+    """Move and turn the things on the table from episode to episode."""
     quality: str = "fast"
     """Look of the pictures, fast or nice; should be that of the pool."""
     max_actions: int = 14
-    """Actions after which an episode is cut off."""
+    """Actions after which an episode is cut off; at the joint level 30 s without a new sub-task end
+    it."""
     jobs: int = default_jobs()
     """Processes that play episodes."""
 
@@ -128,21 +136,30 @@ def evaluate(argv: Sequence[str]) -> int:
     """Run a trained policy in the environment and score it."""
     options = tyro.cli(EvaluateOptions, args=list(argv), prog="teasim evaluate")
     from policies.checkpoint import load_policy
-    from policies.comparison import compare, comparison_json, comparison_text
-    from policies.evaluation import EvaluationConfig, evaluate_all
+    from policies.joint.policy import MotionPolicy
     from policies.outputs import check_file
-    from policies.results import Bar, summary, write_junit, write_scores
-    from policies.rollout import EnvironmentConfig
 
-    bar = None if options.min_policy_accuracy is None else Bar(options.min_policy_accuracy)
     check_file(options.json)
     check_file(options.junit)
+    policy = load_policy(options.run)
+    if isinstance(policy, MotionPolicy):
+        return _evaluate_joints(policy, options)
+    return _evaluate_subtasks(policy, options)
+
+
+def _evaluate_subtasks(policy: "SubtaskPolicy", options: EvaluateOptions) -> int:
+    """Run a policy over sub-tasks and score its choices."""
+    from policies.comparison import compare, comparison_json, comparison_text
+    from policies.evaluation import EvaluationConfig, evaluate_all
+    from policies.results import Bar, summary, write_junit, write_scores
+    from policies.rollout import ENVIRONMENT, EnvironmentConfig
+
+    bar = None if options.min_policy_accuracy is None else Bar(options.min_policy_accuracy)
     world = EnvironmentConfig(
-        options.env_id, quality=options.quality, max_actions=options.max_actions
+        options.env_id or ENVIRONMENT, options.quality, options.randomize, options.max_actions
     )
     config = EvaluationConfig(options.episodes, options.seed, world, options.video)
-    policy = load_policy(options.run)
-    rivals = [] if options.against is None else [load_policy(options.against)]
+    rivals = [] if options.against is None else [_load_rival(options.against)]
     scores, *others = evaluate_all([policy, *rivals], config, jobs=options.jobs)
     about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
     print(summary(scores))
@@ -158,6 +175,49 @@ def evaluate(argv: Sequence[str]) -> int:
         return 0
     print(f"policy accuracy is below {bar.percent:g} %")
     return 1
+
+
+def _load_rival(run: Path) -> "SubtaskPolicy":
+    """Read a policy that one over sub-tasks can be compared with."""
+    from policies.checkpoint import load_policy
+    from policies.joint.policy import MotionPolicy
+    from teasim.errors import ConfigError
+
+    policy = load_policy(run)
+    if isinstance(policy, MotionPolicy):
+        raise ConfigError(
+            f"'{run}' holds a policy of the joint level; a comparison needs two over sub-tasks."
+        )
+    return policy
+
+
+def _evaluate_joints(policy: "MotionPolicy", options: EvaluateOptions) -> int:
+    """Run a policy of the joint level and score how far it gets."""
+    from policies.evaluation import EvaluationConfig
+    from policies.joint.evaluation import evaluate_motion
+    from policies.joint.results import motion_json, motion_summary
+    from policies.joint.rollout import JOINT_ENVIRONMENT
+    from policies.rollout import EnvironmentConfig
+    from teasim.errors import ConfigError
+    from teasim.pool.files import write_json
+
+    asked = (options.min_policy_accuracy, options.against, options.junit, options.video)
+    if any(option is not None for option in asked):
+        raise ConfigError(
+            "A policy at the joint level chooses no sub-tasks; leave out --min-policy-accuracy, "
+            "--against, --junit and --video."
+        )
+    world = EnvironmentConfig(
+        options.env_id or JOINT_ENVIRONMENT, options.quality, options.randomize, max_actions=None
+    )
+    scores = evaluate_motion(
+        policy, EvaluationConfig(options.episodes, options.seed, world), jobs=options.jobs
+    )
+    print(motion_summary(scores))
+    if options.json:
+        about = {"run": str(options.run), "version": version("teasim"), "world": asdict(world)}
+        write_json(options.json, about | {"scores": motion_json(scores)})
+    return 0
 
 
 def demo(argv: Sequence[str]) -> int:

@@ -7,27 +7,30 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.base import DecisionSamples
 from policies.bc import BC, BCConfig
 from policies.bc_rnn import BCRNN, BCRNNConfig
 from policies.bcnd import BCND, BCNDConfig
 from policies.demodice import DemoDICE, DemoDICEConfig
+from policies.joint.nearest import Nearest, NearestConfig
 from policies.r_maxent import RMaxEnt, RMaxEntConfig
-from policies.subtask_policy import SubtaskPolicy
 from teasim.errors import ConfigError, named
 
 
 class Learner(Protocol):
-    """Turns weighted decisions into a policy; learned attributes end in an underscore."""
+    """Turns weighted samples into a policy; learned attributes end in an underscore.
+
+    At the sub-task level the samples are `base.DecisionSamples` and the policy a `SubtaskPolicy`,
+    at the joint level `motions.MotionSamples` and a `MotionPolicy`.
+    """
 
     config: Any
     """Frozen settings; `fit` never changes them."""
-    policy_: SubtaskPolicy
+    policy_: Any
     """What was learned."""
     history_: Sequence[float]
-    """Training loss after each step [nat per decision]."""
+    """Training loss of each step [nat per decision; spreads of a joint target]."""
 
-    def fit(self, samples: DecisionSamples, weights: NDArray[np.float64]) -> Self:
+    def fit(self, samples: Any, weights: NDArray[np.float64]) -> Self:
         """Learn from `samples` with one weight per demonstration of the pool, (D,)."""
 
 
@@ -38,7 +41,7 @@ class LearnerKind:
     learner: type[Any]
     config: type[Any]
     levels: tuple[str, ...]
-    """Levels it learns at: `subtask` (which sub-task comes next)."""
+    """Levels it learns at: `subtask` (which sub-task comes next), `joint` (where the joints go)."""
 
     @property
     def takes_experts(self) -> bool:
@@ -56,6 +59,7 @@ LEARNERS = {
     "bc-rnn": LearnerKind(BCRNN, BCRNNConfig, ("subtask",)),
     "bcnd": LearnerKind(BCND, BCNDConfig, ("subtask",)),
     "demodice": LearnerKind(DemoDICE, DemoDICEConfig, ("subtask",)),
+    "nearest": LearnerKind(Nearest, NearestConfig, ("joint",)),
     "r-maxent": LearnerKind(RMaxEnt, RMaxEntConfig, ("subtask",)),
 }
 

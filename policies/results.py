@@ -109,18 +109,19 @@ def _story(episode: Episode) -> str:
 
 def _scores_json(scores: Scores) -> dict[str, Any]:
     return {
-        "policy_accuracy": _rate_json(scores.policy_accuracy),
-        "lenient_accuracy": _rate_json(scores.lenient_accuracy),
-        "success": _rate_json(scores.success),
-        "unsafe": _rate_json(scores.unsafe),
-        "spills": _rate_json(scores.spills),
-        "completion": {name: _rate_json(rate) for name, rate in scores.completion.items()},
+        "policy_accuracy": rate_json(scores.policy_accuracy),
+        "lenient_accuracy": rate_json(scores.lenient_accuracy),
+        "success": rate_json(scores.success),
+        "unsafe": rate_json(scores.unsafe),
+        "spills": rate_json(scores.spills),
+        "completion": {name: rate_json(rate) for name, rate in scores.completion.items()},
         "violations": scores.violations,
         "episodes": [asdict(episode) for episode in scores.episodes],
     }
 
 
-def _rate_json(rate: Rate) -> dict[str, Any]:
+def rate_json(rate: Rate) -> dict[str, Any]:
+    """Turn a rate into what JSON can hold, in percent."""
     return {
         "percent": 100 * rate.value if rate.trials else None,
         "low_percent": 100 * rate.low,

@@ -27,8 +27,8 @@ class EnvironmentConfig:
     """Rendering quality, fast or nice; should be that of the pool."""
     randomize: bool = True
     """Move and turn the things on the table from episode to episode."""
-    max_actions: int = 14
-    """Actions after which an episode is cut off."""
+    max_actions: int | None = 14
+    """Actions after which an episode is cut off; None: the environment has no such setting."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,13 @@ def make_environment(
         sight = {"obs_type": "pixels_agent_pos", "cameras": spec.cameras, **size}
     elif filmed:
         sight["render_mode"] = "rgb_array"
+    if config.max_actions is not None:
+        sight["max_actions"] = config.max_actions
     try:
         return gym.make(
             config.env_id,
             quality=config.quality,
             randomize=config.randomize,
-            max_actions=config.max_actions,
             **sight,
         )
     except (gym.error.Error, TypeError, ImportError) as error:

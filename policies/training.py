@@ -1,13 +1,17 @@
 """A pool, a weight table and a learner's name -> a policy on disk."""
 
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+from policies.base import DecisionSamples
 from policies.checkpoint import save_policy
 from policies.demos import DemosConfig, load_decisions
+from policies.joint.motions import MotionSamples, load_motions
 from policies.learners import LEARNERS, LearnerKind, find_learner
 from policies.weighting import demo_weights, likely_experts
 from teasim.errors import ConfigError
@@ -22,7 +26,7 @@ class TrainConfig:
     learner: str = "bc"
     """Name of the learner."""
     level: str = "subtask"
-    """What is chosen: `subtask`."""
+    """What is chosen: `subtask` or `joint`."""
     weights: Path | None = None
     """Weight table; None: every demonstration counts once."""
     use: str = "ignore"
@@ -34,6 +38,28 @@ class TrainConfig:
     weights in the table."""
     seed: int = 0
     """Seed of the learner."""
+
+
+def _load_motions(pool: Pool, demos: DemosConfig, *, jobs: int) -> MotionSamples:
+    return load_motions(pool, demos.observe, jobs=jobs)
+
+
+@dataclass(frozen=True)
+class Level:
+    """What a learner of a level is given."""
+
+    load: Callable[..., DecisionSamples | MotionSamples]
+    """Reads it: (pool, demos config, jobs) -> samples."""
+    unit: str
+    """What the rows of the samples are."""
+
+
+LEVELS: Mapping[str, Level] = MappingProxyType(
+    {
+        "subtask": Level(load_decisions, "decisions"),
+        "joint": Level(_load_motions, "control steps"),
+    }
+)
 
 
 def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int = 1) -> str:
@@ -52,7 +78,8 @@ def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int =
     settings = expert_settings(kind, pool, config)
     check_new_folder(run)
     began = time.perf_counter()
-    samples = load_decisions(pool, demos, jobs=jobs)
+    level = LEVELS[config.level]
+    samples = level.load(pool, demos, jobs=jobs)
     learner = kind.make(seed=config.seed, **settings).fit(samples, weights)
     training = {
         **asdict(config),
@@ -67,7 +94,7 @@ def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int =
     seconds = time.perf_counter() - began
     return (
         f"{config.learner} on {int((weights > 0).sum())} of {len(weights)} demonstrations, "
-        f"{len(samples.labels)} decisions, loss {learner.history_[-1]:.3f}, "
+        f"{len(samples.demos)} {level.unit}, loss {learner.history_[-1]:.3f}, "
         f"{seconds:.0f} s -> {run}"
     )
 

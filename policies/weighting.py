@@ -4,6 +4,7 @@ The law every learner keeps: weight 0 equals the demonstration removed, weight 2
 """
 
 from pathlib import Path
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 import torch
@@ -86,13 +87,25 @@ def _weight(row: WeightRow, use: str) -> float:
     return float(row.weight) if use == "weight" else 1.0
 
 
-def weigh(
-    samples: DecisionSamples, weights: NDArray[np.float64]
-) -> tuple[DecisionSamples, NDArray[np.float64]]:
-    """Return the decisions that count and the share of the total each one has, (n,), sum 1.
+class Samples(Protocol):
+    """What a learner is given: rows, each from a demonstration."""
+
+    @property
+    def demos(self) -> NDArray[np.int64]:
+        """Position in the pool of each row's demonstration, (n,)."""
+
+    def take(self, rows: NDArray[np.bool_]) -> Self:
+        """Return the rows where `rows` (n,) is true."""
+
+
+Rows = TypeVar("Rows", bound=Samples)
+
+
+def weigh(samples: Rows, weights: NDArray[np.float64]) -> tuple[Rows, NDArray[np.float64]]:
+    """Return the rows that count and the share of the total each one has, (n,), sum 1.
 
     Args:
-        samples: decisions of a pool of D demonstrations.
+        samples: decisions or control steps of a pool of D demonstrations.
         weights: weight per demonstration, (D,), not negative.
 
     Raises:

@@ -5,6 +5,8 @@ import pytest
 
 from policies.base import DecisionSamples, ObservationSpec
 from policies.demos import DemosConfig, load_decisions
+from policies.joint.motions import MotionSamples
+from tests.policies.fake_joints import make_joint_pool
 from tests.policies.fakes import SEQ_1, make_fake_pool
 
 WITHOUT_TEA_BAG = tuple(action for action in SEQ_1 if action != 4)
@@ -47,3 +49,26 @@ def samples():
     joints = random.normal(0, 1e-3, (30, 2)).astype(np.float32)
     spec = ObservationSpec(("left", "cup"), 48, 48, ("shoulder", "elbow"))
     return DecisionSamples(maps, joints, labels, demos, spec, ("a", "b", "c"))
+
+
+@pytest.fixture(scope="session")
+def motions():
+    """5 demonstrations of 6 control steps: two joints on a circle, the last the other way round."""
+    angles = np.tile(np.arange(6) / 6 * 2 * np.pi, 5)
+    demos = np.repeat(np.arange(5), 6)
+    angles[demos == 4] *= -1
+    random = np.random.default_rng(0)
+    low_dim = np.stack([np.cos(angles), np.sin(angles), np.tile(np.arange(6), 5)], axis=1)
+    low_dim[:, :2] += random.normal(0, 0.02, (30, 2))
+    ahead = angles + np.where(demos == 4, -1, 1) * 2 * np.pi / 6
+    targets = np.stack([np.cos(ahead), np.sin(ahead)], axis=1)
+    spec = ObservationSpec((), 0, 0, ("shoulder", "elbow"), ("clock",))
+    return MotionSamples(
+        low_dim.astype(np.float32), targets.astype(np.float32), demos, spec, ("shoulder", "elbow")
+    )
+
+
+@pytest.fixture(scope="session")
+def joint_pool(tmp_path_factory):
+    """Four demonstrations of the fake joints, each at a tempo of its own."""
+    return make_joint_pool(tmp_path_factory.mktemp("pools") / "joints")

@@ -140,7 +140,7 @@ POOLS = 'pools = ["pool"]\n'
         (POOLS + 'filters = "norm"', "'filters' must be tables, [filters.NAME] each."),
         (
             POOLS + 'learners = ["sac"]\n' + FILTERS,
-            "Unknown learner 'sac'; choose bc, bc-rnn, bcnd, demodice, r-maxent.",
+            "Unknown learner 'sac'; choose bc, bc-rnn, bcnd, demodice, nearest, r-maxent.",
         ),
         (
             POOLS + 'learners = ["demodice"]\n' + FILTERS,

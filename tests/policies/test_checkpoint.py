@@ -21,8 +21,9 @@ def run(samples, tmp_path):
 
 
 @EVERY
-def test_a_saved_policy_decides_as_before(name, samples, tmp_path):
-    policy = make(name, steps=5).fit(samples, np.ones(5)).policy_
+def test_a_saved_policy_decides_as_before(name, samples, motions, tmp_path):
+    samples = motions if LEARNERS[name].levels == ("joint",) else samples
+    policy = make(name).fit(samples, np.ones(5)).policy_
     save_policy(policy, tmp_path, training={})
     loaded = load_policy(tmp_path)
     np.testing.assert_array_equal(replay(loaded, samples), replay(policy, samples))
@@ -96,6 +97,7 @@ def test_missing_weights(run):
         {"observation": None},
         {"kind": "oracle"},
         {"kind": "recurrent"},
+        {"kind": "memory"},
         {"settings": {"hidden": 3}},
     ],
 )

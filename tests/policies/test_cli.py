@@ -12,6 +12,7 @@ from policies.rollout import ENVIRONMENT
 from teasim.errors import CheckpointError, ConfigError, PoolError, TeasimError
 from teasim.pool.weight_table import WeightRow, write_weight_table
 from tests.policies.fakes import FAKE_ID
+from tests.policies.learning import AT_SUBTASKS
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +75,7 @@ def test_flagged_demonstrations_are_left_out(fake_pool, tmp_path, capsys):
     assert training["use"] == "discard"
 
 
-@pytest.mark.parametrize("learner", LEARNERS)
+@pytest.mark.parametrize("learner", AT_SUBTASKS)
 def test_every_learner_makes_tea_from_the_state(learner, fake_pool, tmp_path, capsys):
     rows = [
         WeightRow(e.demo_id, e.index, 1.0 - e.index / 10, 0.0, False, 0, "")

@@ -1,19 +1,28 @@
 """Laws that every learner keeps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
-from policies.base import DecisionSamples
 from policies.learners import LEARNERS, find_learner
 from teasim.errors import ConfigError
-from tests.policies.learning import make, replay
+from tests.policies.learning import AT_SUBTASKS, make, replay
 
 EVERY = pytest.mark.parametrize("name", LEARNERS)
 
 
-SEEDLESS = {"r-maxent"}
+SEEDLESS = {"nearest", "r-maxent"}
 """Learners that draw nothing: every seed gives the same."""
+DESCENDING = pytest.mark.parametrize("name", [name for name in LEARNERS if name != "nearest"])
+"""Learners that lower a loss step by step; the nearest neighbour remembers."""
+
+
+@pytest.fixture
+def samples(name, samples, motions):
+    """What the learner `name` is given: 5 demonstrations of 6 rows, the last of which errs."""
+    return motions if LEARNERS[name].levels == ("joint",) else samples
 
 
 def fit(name, samples, weights, seed=0):
@@ -46,9 +55,7 @@ def test_weight_2_equals_the_demonstration_twice(name, samples):
     rows = np.arange(30)
     taken = samples.take(np.concatenate([rows, rows[samples.demos == 2]]))
     demos = np.where(np.arange(36) < 30, taken.demos, 5)
-    twice = DecisionSamples(
-        taken.maps, taken.low_dim, taken.labels, demos, taken.spec, taken.action_names
-    )
+    twice = replace(taken, demos=demos)
     assert_same(fit(name, samples, [1, 1, 2, 1, 1]), fit(name, twice, np.ones(6)), **CLOSE)
 
 
@@ -90,15 +97,20 @@ def test_one_seed_one_result_whatever_the_global_state(name, samples):
 
 
 @EVERY
-def test_learning_lowers_the_loss_and_fit_returns_self(name, samples):
+def test_fit_returns_self_and_leaves_the_settings(name, samples):
     learner = make(name)
     config = learner.config
     assert learner.fit(samples, np.ones(5)) is learner
     assert learner.config is config
+
+
+@DESCENDING
+def test_learning_lowers_the_loss(name, samples):
+    learner = fit(name, samples, np.ones(5))
     assert learner.history_[-1] < 0.7 * learner.history_[0]
 
 
-@EVERY
+@pytest.mark.parametrize("name", AT_SUBTASKS)
 def test_a_clear_majority_decides(name, samples):
     policy = fit(name, samples, np.ones(5)).policy_
     right = samples.take(samples.demos != 4)
@@ -129,9 +141,12 @@ def test_an_unknown_learner_or_level_names_the_choices():
     with pytest.raises(ConfigError) as error:
         find_learner("bc", "joint")
     assert str(error.value) == "The learner 'bc' has no level 'joint'; choose subtask."
+    with pytest.raises(ConfigError) as error:
+        find_learner("nearest", "subtask")
+    assert str(error.value) == "The learner 'nearest' has no level 'subtask'; choose joint."
 
 
-@EVERY
+@DESCENDING
 def test_no_learner_starts_with_settings_that_cannot_train(name):
     with pytest.raises(ConfigError, match="steps >= 1"):
         make(name, steps=0)
@@ -147,6 +162,7 @@ def test_no_learner_starts_with_settings_that_cannot_train(name):
         ),
         ("bc", {"bottleneck": 0}, "bottleneck is 0; choose 1 or more."),
         ("bc-rnn", {"hidden": 0}, "hidden is 0; choose 1 or more."),
+        ("nearest", {"chunk": 0}, "chunk is 0; choose 1 or more."),
         ("bcnd", {"members": 0}, "bcnd needs members >= 1 and rounds >= 1."),
         ("demodice", {"gamma": 1.0}, "gamma is 1.0; choose more than 0 and less than 1."),
         ("demodice", {"alpha": -1.0}, "demodice needs alpha >= 0 and gradient_penalty >= 0."),

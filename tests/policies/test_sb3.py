@@ -9,12 +9,11 @@ from stable_baselines3.common.evaluation import evaluate_policy
 
 from policies.base import ObservationSpec
 from policies.demos import DemosConfig, load_decisions
-from policies.learners import LEARNERS
 from policies.sb3 import as_ppo, sb3_environment
 from teasim.constants import STATE_NAMES
 from teasim.errors import ConfigError
 from tests.policies.fakes import FAKE_WORLD, FLAGS, SIZE
-from tests.policies.learning import make
+from tests.policies.learning import AT_SUBTASKS, make
 
 STATE = ObservationSpec((), 0, 0, STATE_NAMES, FLAGS)
 
@@ -29,7 +28,7 @@ def cloned(from_state):
     return make("bc").fit(from_state, np.ones(7)).policy_
 
 
-@pytest.mark.parametrize("name", LEARNERS)
+@pytest.mark.parametrize("name", AT_SUBTASKS)
 def test_evaluate_policy_plays_every_policy(name, from_state):
     policy = make(name).fit(from_state, np.array([1.0] * 6 + [0])).policy_
     env = sb3_environment(FAKE_WORLD, STATE)

@@ -1,0 +1,1 @@
+"""The joint level: where the joints go next, ten times a second."""
