@@ -29,7 +29,12 @@ from filtering.segmentation.mstcn_folder import (
     write_predictions,
 )
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
-from filtering.segmentation.mstcn_training import LabelledVideo, MSTCNConfig, MSTCNLearner
+from filtering.segmentation.mstcn_training import (
+    LabelledVideo,
+    MSTCNConfig,
+    MSTCNLearner,
+    least_lengths,
+)
 from filtering.segmentation.scoring import UNSEEN, score_episodes, scores_json
 from filtering.segmentation.segments import decode
 from teasim.errors import ConfigError, PoolError
@@ -58,8 +63,9 @@ class FitConfig:
     """Cameras whose pictures are used; empty means all."""
     rate: float = 2.5
     """Moments looked at per second of video [Hz]."""
-    shortest: float = 0.4
-    """Least length of a segment that the segmenter returns [s]."""
+    shortest: float | None = None
+    """Least length of a segment that the segmenter returns [s]; None: of each sub-task half of the
+    shortest one that is labelled."""
     features: bool = False
     """Whether the paper's features are learned too, from the first of the cameras."""
     network: MSTCNConfig = field(default_factory=MSTCNConfig)
@@ -108,7 +114,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         subtasks=subtasks,
         source=frames,
         scaling=config.network.scaling,
-        shortest=config.shortest,
+        shortest=least_seconds(videos, n_labels, min(frames.rate, pool.fps), config.shortest),
         labelled=frozenset(episode.demo_id for episode in chosen),
     )
     effects = _learn_effects(pool, chosen, features, frames)
@@ -260,6 +266,15 @@ def labelled_videos(
         labels = np.where(labels == NO_SUBTASK, len(subtasks), labels)
         videos.append(LabelledVideo(f"of demonstration {episode.index}", moments, labels))
     return videos
+
+
+def least_seconds(
+    videos: Sequence[LabelledVideo], n_labels: int, rate: float, told: float | None = None
+) -> tuple[float, ...]:
+    """Return the least length of a run of each label [s], for videos of `rate` moments a second."""
+    if told is not None:
+        return (told,) * n_labels
+    return tuple(moments / rate for moments in least_lengths(videos, n_labels))
 
 
 def _learn_effects(

@@ -18,11 +18,8 @@ from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.mstcn_training import MSTCNConfig, MSTCNLearner
 from filtering.segmentation.scoring import score_episodes
 from filtering.segmentation.segments import Segmentation
-from filtering.segmenting import labelled_videos
+from filtering.segmenting import labelled_videos, least_seconds
 from teasim.pool import Episode, Pool
-
-SHORTEST = 0.4
-"""Least length of a segment [s], the verb's default."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,9 @@ def fit(parts: Sequence[Part], arguments: argparse.Namespace, seed: int) -> MSTC
     learner = MSTCNLearner(config).fit(videos, n_labels)
     labelled = frozenset(e.demo_id for p in parts for e in p.episodes)
     network = learner.network_
-    return MSTCNSegmenter(network, subtasks, source, arguments.scaling, SHORTEST, labelled)
+    fps = min(p.pool.fps for p in parts)
+    shortest = least_seconds(videos, n_labels, min(arguments.rate, fps), arguments.shortest)
+    return MSTCNSegmenter(network, subtasks, source, arguments.scaling, shortest, labelled)
 
 
 def by_order(p: Part, found: Segmentation) -> dict[str, SegmentationScores]:
@@ -91,6 +90,9 @@ def main() -> int:
     parser.add_argument("--scaling", default=MSTCNConfig.scaling, help="video or training")
     parser.add_argument("--cameras", nargs="+", default=["left"])
     parser.add_argument("--rate", type=float, default=FrameSource.rate, help="moments/s looked at")
+    parser.add_argument(
+        "--shortest", type=float, help="least length of every segment [s]; default: learned"
+    )
     parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
     arguments = parser.parse_args()
     found: dict[tuple[str, str], list[SegmentationScores]] = {}

@@ -17,7 +17,7 @@ from filtering.segmentation.scaling import SCALINGS
 from teasim.errors import ConfigError
 from teasim.pool.checkpoint import CheckpointKind
 
-SEGMENTER = CheckpointKind("segmenter", 1, held="segmenter", remedy="fit again")
+SEGMENTER = CheckpointKind("segmenter", 2, held="segmenter", remedy="fit again")
 
 
 def save_segmenter(segmenter: MSTCNSegmenter, folder: Path, record: Mapping[str, Any]) -> None:
@@ -62,6 +62,9 @@ def _segmenter(description: Mapping[str, Any], weights: bytes) -> MSTCNSegmenter
         raise ValueError("one label per sub-task, and at most one for none")
     if description["scaling"] not in SCALINGS:
         raise ValueError("unknown scaling")
+    shortest = tuple(float(seconds) for seconds in description["shortest"])
+    if len(shortest) != network.shape.labels:
+        raise ValueError("one least length per label")
     network.load_state_dict(load_tensors(weights))
     source = description["source"]
     return MSTCNSegmenter(
@@ -69,6 +72,6 @@ def _segmenter(description: Mapping[str, Any], weights: bytes) -> MSTCNSegmenter
         subtasks=subtasks,
         source=FrameSource(tuple(source["cameras"]), float(source["rate"])),
         scaling=description["scaling"],
-        shortest=float(description["shortest"]),
+        shortest=shortest,
         labelled=frozenset(map(str, description["labelled"])),
     )

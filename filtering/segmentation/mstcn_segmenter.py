@@ -32,8 +32,8 @@ class MSTCNSegmenter:
     """What is looked at in a video."""
     scaling: str
     """What features are scaled by, see `MSTCNConfig`."""
-    shortest: float
-    """Least length of a segment [s]."""
+    shortest: tuple[float, ...]
+    """Least length of a run of each of the C labels [s]."""
     labelled: frozenset[str]
     """demo_id of the demonstrations it was fitted to."""
 
@@ -57,7 +57,8 @@ class MSTCNSegmenter:
                 f"'{pool.root}' lacks; it has {', '.join(pool.cameras) or 'none'}."
             )
         features = frame_features(episodes, pool.fps, self.source, jobs=jobs)
-        shortest = max(1, round(self.shortest * min(self.source.rate, pool.fps)))
+        rate = min(self.source.rate, pool.fps)
+        shortest = [max(1, round(seconds * rate)) for seconds in self.shortest]
         described = [
             self._segment_video(moments, episode.length, shortest)
             for moments, episode in zip(features, episodes, strict=True)
@@ -89,7 +90,7 @@ class MSTCNSegmenter:
         return frame_posteriors(self.network, features, self.scaling)
 
     def _segment_video(
-        self, moments: NDArray[np.float32], length: int, shortest: int
+        self, moments: NDArray[np.float32], length: int, shortest: Sequence[int]
     ) -> tuple[tuple[Span, ...], NDArray[np.float32]]:
         """Return the segments and the posteriors (length, T) of a video of `length` frames."""
         posteriors = self.posteriors(moments)

@@ -25,6 +25,9 @@ from teasim.pool.types import runs
 FEWEST_FRAMES = 2
 """The smoothing loss compares frames."""
 
+SHARE_OF_SHORTEST = 0.5
+"""Share of the shortest run that was shown which a run may still last: others may be quicker."""
+
 
 @dataclass(frozen=True)
 class LabelledVideo:
@@ -208,6 +211,18 @@ def rearrange(
     if sum(found[number].length for number in kept) < FEWEST_FRAMES:
         kept = list(order)
     return np.concatenate([np.arange(found[n].start, found[n].stop) for n in kept])
+
+
+def least_lengths(videos: Sequence[LabelledVideo], n_labels: int) -> list[float]:
+    """Return how long a run of each label is at least, C numbers [frames].
+
+    SHARE_OF_SHORTEST of the shortest one that was shown; no bound for a label that was not.
+    """
+    shown = [run for video in videos for run in runs(video.labels)]
+    return [
+        SHARE_OF_SHORTEST * min((run.length for run in shown if run.label == label), default=0)
+        for label in range(n_labels)
+    ]
 
 
 def _standardise(network: MSTCN, features: Sequence[NDArray[np.float32]]) -> None:

@@ -1,5 +1,6 @@
 """What a segmenter returns, and how frame posteriors become segments."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -51,28 +52,67 @@ class Segmenter(Protocol):
         """Return them in the order of `pool.episodes`; they do not depend on `jobs`."""
 
 
-def decode(posteriors: NDArray[np.floating], shortest: int = 1) -> NDArray[np.int64]:
-    """Return the label of each frame, (n,): the most probable, without runs below `shortest`.
+def decode(
+    posteriors: NDArray[np.floating], shortest: Sequence[int] | None = None
+) -> NDArray[np.int64]:
+    """Return the label of each frame, (n,): the most probable labelling whose runs are long enough.
 
-    The shortest run goes first, to the neighbour whose label its frames make more probable, until
-    every run has `shortest` frames or is the only one.
+    A video in which no run is long enough gets the one label that is most probable over all of it.
 
     Args:
         posteriors: (n, C), each row sums to 1.
-        shortest: least length of a run [frames]; 1 keeps all.
+        shortest: C least lengths of a run of each label [frames], 1 or more; None keeps all.
     """
-    labels: NDArray[np.int64] = posteriors.argmax(axis=1).astype(np.int64)
-    logs = np.log(np.maximum(posteriors, TINY))
-    found = runs(labels)
-    while len(found) > 1:
-        place = min(range(len(found)), key=lambda number: found[number].length)
-        run = found[place]
-        if run.length >= shortest:
-            break
-        beside = found[max(place - 1, 0) : place] + found[place + 1 : place + 2]
-        evidence = [logs[run.start : run.stop, other.label].sum() for other in beside]
-        labels[run.start : run.stop] = beside[int(np.argmax(evidence))].label
-        found = runs(labels)
+    if shortest is None:
+        return posteriors.argmax(axis=1).astype(np.int64)
+    logs = np.log(np.maximum(posteriors.astype(np.float64), TINY))
+    sums = np.vstack([np.zeros(logs.shape[1]), np.cumsum(logs, axis=0)])
+    # best[t, c]: the first t frames with a last run of label c that is long enough; began[t, c]:
+    # where that run begins, and after[t, c]: the label before it, -1 for none.
+    best = np.full(sums.shape, -np.inf)
+    began, after = np.zeros(sums.shape, np.int64), np.full(sums.shape, -1)
+    for stop in range(1, len(sums)):
+        for label, least in enumerate(shortest):
+            start = stop - least
+            if start < 0:
+                continue
+            before, value = _best_before(best, start, label)
+            fresh = value + sums[stop, label] - sums[start, label]
+            longer = best[stop - 1, label] + logs[stop - 1, label]
+            best[stop, label] = max(longer, fresh)
+            if longer >= fresh:
+                start, before = began[stop - 1, label], after[stop - 1, label]
+            began[stop, label], after[stop, label] = start, before
+    return _trace(best, began, after, sums)
+
+
+def _best_before(best: NDArray[np.float64], start: int, label: int) -> tuple[int, float]:
+    """Return the label of the run that ends at `start` before one of `label`, and its value."""
+    if start == 0:
+        return -1, 0.0
+    others = best[start].copy()
+    others[label] = -np.inf  # two runs of one label would be one
+    place = int(others.argmax())
+    return place, float(others[place])
+
+
+def _trace(
+    best: NDArray[np.float64],
+    began: NDArray[np.int64],
+    after: NDArray[np.int64],
+    sums: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """Go back from the end over the best runs."""
+    labels = np.zeros(len(best) - 1, dtype=np.int64)
+    label = int(best[-1].argmax())
+    if not np.isfinite(best[-1, label]):
+        labels[:] = sums[-1].argmax()
+        return labels
+    stop = len(labels)
+    while stop > 0:
+        start, before = began[stop, label], after[stop, label]
+        labels[start:stop] = label
+        stop, label = int(start), int(before)
     return labels
 
 

@@ -19,6 +19,7 @@ from filtering.segmentation.mstcn_training import (
     MSTCNConfig,
     MSTCNLearner,
     frame_posteriors,
+    least_lengths,
     rearrange,
 )
 from filtering.segmentation.scaling import scaled
@@ -227,3 +228,11 @@ def test_what_cannot_be_learnt_from_is_refused(make, message):
     with pytest.raises(ConfigError) as caught:
         make()
     assert str(caught.value) == message
+
+
+def test_a_run_may_last_half_of_the_shortest_that_was_shown():
+    videos = [
+        LabelledVideo(name, np.zeros((len(labels), 2), np.float32), np.array(labels))
+        for name, labels in (("a", [0] * 6 + [1] * 3), ("b", [0] * 4 + [1] * 9 + [0] * 8))
+    ]
+    assert least_lengths(videos, 3) == [2.0, 1.5, 0.0]

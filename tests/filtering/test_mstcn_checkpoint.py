@@ -30,7 +30,7 @@ def segmenter() -> MSTCNSegmenter:
         subtasks=("pour", "stir"),
         source=FrameSource(("left", "cup"), 5.0),
         scaling="video",
-        shortest=0.4,
+        shortest=(0.4, 0.8, 0.4),
         labelled=frozenset({"abc", "def"}),
     )
 
@@ -111,7 +111,7 @@ def test_another_kind_of_file(saved):
 def test_another_version(saved):
     change(saved, version=9)
     assert sentence(saved) == (
-        f"'{saved / 'segmenter.json'}' has version 9, this program reads 1; fit again."
+        f"'{saved / 'segmenter.json'}' has version 9, this program reads 2; fit again."
     )
 
 
@@ -135,6 +135,7 @@ def test_other_features(saved):
         {"source": None},
         {"source": {"cameras": [], "rate": 5.0}},
         {"source": {"cameras": ["left"], "rate": 0.0}},
+        {"shortest": [0.4]},
         {"scaling": "none"},
         {"labelled": None},
     ],

@@ -1,6 +1,8 @@
+from itertools import product
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filtering.segmentation.segments import decode, spans_of
@@ -25,18 +27,41 @@ def test_without_a_least_length_each_frame_gets_its_most_probable_label(labels):
     assert decode(certain(labels)).tolist() == labels
 
 
-@given(st.lists(st.integers(0, 2), min_size=1, max_size=40), st.integers(1, 10))
-def test_no_run_is_shorter_than_the_least_length_unless_it_is_the_only_one(labels, shortest):
+shortest_of = st.lists(st.integers(1, 4), min_size=3, max_size=3)
+
+
+@given(st.lists(st.integers(0, 2), min_size=1, max_size=40), shortest_of)
+def test_no_run_is_shorter_than_its_least_length_unless_it_is_the_only_one(labels, shortest):
     found = runs(decode(certain(labels), shortest))
-    assert len(found) == 1 or min(run.length for run in found) >= shortest
+    assert len(found) == 1 or all(run.length >= shortest[run.label] for run in found)
+
+
+@given(st.integers(1, 7), shortest_of, st.integers(0, 10_000))
+@settings(deadline=None)
+def test_no_labelling_with_long_enough_runs_is_more_probable(frames, shortest, seed):
+    posteriors = np.random.default_rng(seed).dirichlet([0.5] * 3, frames)
+
+    def value(labels):
+        return float(np.log(np.maximum(posteriors[np.arange(frames), labels], 1e-12)).sum())
+
+    able = [
+        value(labels)
+        for labels in product(range(3), repeat=frames)
+        if all(run.length >= shortest[run.label] for run in runs(np.array(labels)))
+    ]
+    found = decode(posteriors, shortest)
+    if able:
+        assert value(found) == pytest.approx(max(able))
+    else:
+        assert set(found) == {int(np.log(np.maximum(posteriors, 1e-12)).sum(axis=0).argmax())}
 
 
 def test_a_short_run_goes_to_the_neighbour_that_explains_it_better():
     posteriors = certain([0, 0, 0, 1, 2, 2, 2])
     posteriors[3] = [0.3, 0.5, 0.2]
-    assert decode(posteriors, 2).tolist() == [0, 0, 0, 0, 2, 2, 2]
+    assert decode(posteriors, [2, 2, 2]).tolist() == [0, 0, 0, 0, 2, 2, 2]
     posteriors[3] = [0.2, 0.5, 0.3]
-    assert decode(posteriors, 2).tolist() == [0, 0, 0, 2, 2, 2, 2]
+    assert decode(posteriors, [2, 2, 2]).tolist() == [0, 0, 0, 2, 2, 2, 2]
 
 
 def test_spans_leave_out_frames_of_no_subtask():
