@@ -24,9 +24,15 @@ from filtering.weights.steps import StepList
 from policies.statistics import wilson_interval
 from teasim.pool import Pool, Span
 from teasim.pool.leakage import auroc
+from teasim.task.recipes import PRECEDENCE
 
 SIZES = (1, 2, 4, 6, 8)
 """Numbers of demonstrations that are not Seq_1 beside ten that are (paper, tables 2 and 3)."""
+THREE = (("seq_1", 6), ("seq_2", 4), ("seq_3", 2))
+"""The paper's pool of three kinds."""
+USUAL = FilterConfig()
+LEGAL = tuple((before, name) for name, needed in PRECEDENCE.items() for before in needed)
+"""Which sub-task has to come before which."""
 
 
 @dataclass(frozen=True)
@@ -96,25 +102,33 @@ class Draws:
         """Keep the bank; `pools` are drawn for every row."""
         self.demos, self.subtasks, self.pools = demos, subtasks, pools
 
-    def judge(self, kinds: Sequence[tuple[str, int]], groups: str, row: int) -> list[Outcome]:
+    def judge(
+        self,
+        kinds: Sequence[tuple[str, int]],
+        row: int,
+        config: FilterConfig = USUAL,
+        times: int = 1,
+    ) -> list[Outcome]:
         """Draw `count` demonstrations of each sequence; those after the first kind are wrong."""
         outcomes = []
-        for number in range(self.pools):
+        for number in range(times * self.pools):
             rng = np.random.default_rng([row, number])
             drawn = [self._draw(kind, count, rng) for kind, count in kinds]
             wrong = np.repeat(
                 [position > 0 for position in range(len(kinds))], list(map(len, drawn))
             )
-            outcomes.append(self.outcome([demo for some in drawn for demo in some], wrong, groups))
+            outcomes.append(self.outcome([demo for some in drawn for demo in some], wrong, config))
         return outcomes
 
-    def outcome(self, demos: Sequence[Demo], wrong: np.ndarray, groups: str) -> Outcome:
+    def outcome(
+        self, demos: Sequence[Demo], wrong: np.ndarray, config: FilterConfig = USUAL
+    ) -> Outcome:
         """Judge one pool."""
         known = Evidence(self.subtasks, tuple(demo.spans for demo in demos))
         changed = [demo.changes for demo in demos if demo.changes is not None]
         if changed:
             known = replace(known, idle=effect_surprises(changed, known.labels))
-        return Outcome(by_norm(known, FilterConfig(groups=groups).rule()), wrong)
+        return Outcome(by_norm(known, config.rule()), wrong)
 
     def _draw(self, kind: str, count: int, rng: np.random.Generator) -> list[Demo]:
         able = [demo for demo in self.demos if demo.sequence == kind and _plain(demo)]
@@ -133,17 +147,19 @@ def tables(draws: Draws) -> None:
     for kind in ("seq_3", "seq_2"):
         for k in SIZES:
             row += 1
-            _print(f"10 seq_1 + {k} {kind}", draws.judge([("seq_1", 10), (kind, k)], "auto", row))
-    three = draws.judge([("seq_1", 6), ("seq_2", 4), ("seq_3", 2)], "3", 20)
-    truth = np.repeat([0, 1, 2], [6, 4, 2])
-    right = sum(bool((o.verdict.grouping.groups == truth).all()) for o in three)
-    print(f"6 + 4 + 2, told three groups: exactly right in {_share(right, len(three))}")
-    clean = draws.judge([("seq_1", 12)], "auto", 21)
+            _print(f"10 seq_1 + {k} {kind}", draws.judge([("seq_1", 10), (kind, k)], row))
+    for groups in ("3", "auto"):
+        three = draws.judge(THREE, 20, FilterConfig(groups=groups))
+        truth = np.repeat(range(3), [count for _, count in THREE])
+        right = sum(bool((o.verdict.grouping.groups == truth).all()) for o in three)
+        print(f"6 + 4 + 2, groups {groups}: exactly right in {_share(right, len(three))}")
+    clean = draws.judge([("seq_1", 12)], 21, times=2)
     silent = sum(not o.flagged.any() for o in clean)
     print(f"12 seq_1: nothing flagged in {_share(silent, len(clean))}")
-    legal = draws.judge([("seq_1", 10), ("legal", 2)], "auto", 22)
-    accused = sum(o.found for o in legal)
-    print(f"10 seq_1 + 2 legal: legal ones flagged {_share(accused, 2 * len(legal))}")
+    for name, pairs in (("", ()), (", precedence told", LEGAL)):
+        legal = draws.judge([("seq_1", 10), ("legal", 2)], 22, FilterConfig(precedence=pairs))
+        accused = sum(o.found for o in legal)
+        print(f"10 seq_1 + 2 legal{name}: legal ones flagged {_share(accused, 2 * len(legal))}")
 
 
 def kinds_table(draws: Draws) -> None:
@@ -159,7 +175,7 @@ def kinds_table(draws: Draws) -> None:
             able = [demo for demo in draws.demos if kind in demo.mistakes]
             pool.append(able[rng.integers(len(able))])
         wrong = np.arange(len(pool)) >= 10
-        losses = draws.outcome(pool, wrong, "auto").verdict.losses
+        losses = draws.outcome(pool, wrong).verdict.losses
         for position, kind in enumerate(kinds, start=10):
             chosen = [*range(10), position]
             areas[kind].append(auroc(losses[chosen], wrong[chosen]))

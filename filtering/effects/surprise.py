@@ -1,8 +1,8 @@
 """Segments that change less than is usual: all the motion of a sub-task and nothing came of it.
 
 No label of an effect is needed. The other demonstrations say what a segment of this sub-task
-usually changes, m, the median of their changes, and how changes scatter about it, C. A segment's
-change x has then
+usually changes after the same sub-tasks, m, the median of their changes, and how changes scatter
+about it, C: sugar in an empty cup is another sight than sugar in tea. A segment's change x has then
 
     a = (m' C^-1 x) / (m' C^-1 m)               of the usual effect, 1 when it is there, 0 when not,
 
@@ -33,7 +33,7 @@ SPREAD_FLOOR = 0.15
 SPREAD_PRIOR, PRIOR_DEMOS = 0.5, 2.0
 """Scatter that is assumed before any demonstration is seen, and how many it counts for."""
 FEWEST_OTHERS = 2
-"""With fewer other demonstrations that show a sub-task nobody knows what is usual."""
+"""With fewer other demonstrations that show a step nobody knows what is usual."""
 FAR = 2.0
 """A change that is further off than this many medians counts as this far in the scatter C."""
 
@@ -47,28 +47,28 @@ def effect_surprises(changes: Sequence[Array], labels: Sequence[Sequence[int]]) 
     """
     lengths = [len(rows) for rows in changes]
     demos = np.repeat(np.arange(len(changes)), lengths)
-    subtasks = np.concatenate([np.asarray(names, dtype=np.int64) for names in labels])
+    steps = _steps(labels)
     with threadpool_limits(limits=1, user_api="blas"):
-        amounts = effect_amounts(_main_directions(np.vstack(changes)), subtasks, demos)
+        amounts = effect_amounts(_main_directions(np.vstack(changes)), steps, demos)
     nats = np.zeros(len(amounts))
     for row in np.flatnonzero(np.isfinite(amounts)):
-        others = amounts[(subtasks == subtasks[row]) & (demos != demos[row])]
+        others = amounts[(steps == steps[row]) & (demos != demos[row])]
         # The opposite of the usual effect is no more than none of it.
         nats[row] = (1 - 2 * max(amounts[row], 0.0)) / (2 * _spread(others) ** 2)
     return np.split(np.maximum(nats, 0.0), np.cumsum(lengths)[:-1])
 
 
-def effect_amounts(changes: Array, subtasks: NDArray[np.int64], demos: NDArray[np.int64]) -> Array:
+def effect_amounts(changes: Array, steps: NDArray[np.int64], demos: NDArray[np.int64]) -> Array:
     """Return (S,): a, how much of the usual effect each segment had; NaN where none is known.
 
     Args:
         changes: (S, K) what the segments of all demonstrations changed.
-        subtasks: (S,) label of each.
+        steps: (S,) equal numbers for those that can be compared.
         demos: (S,) demonstration of each.
     """
     usual = np.full(changes.shape, np.nan)
     for row in range(len(changes)):
-        others = (subtasks == subtasks[row]) & (demos != demos[row])
+        others = (steps == steps[row]) & (demos != demos[row])
         if len(np.unique(demos[others])) >= FEWEST_OTHERS:
             usual[row] = np.median(changes[others], axis=0)
     known = np.isfinite(usual).all(axis=1)
@@ -82,6 +82,13 @@ def effect_amounts(changes: Array, subtasks: NDArray[np.int64], demos: NDArray[n
         # A sub-task that never changes anything had all of its effect.
         amounts[own] = np.divide(seen, strength, out=np.ones(len(seen)), where=strength > 0)
     return amounts
+
+
+def _steps(labels: Sequence[Sequence[int]]) -> NDArray[np.int64]:
+    """Number all segments (S,): equal for one sub-task after the same ones."""
+    keys = [(label, frozenset(demo[:k])) for demo in labels for k, label in enumerate(demo)]
+    numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+    return np.array([numbers[key] for key in keys], dtype=np.int64)
 
 
 def _main_directions(changes: Array) -> Array:

@@ -164,6 +164,16 @@ def test_what_only_one_demonstration_or_none_shows_costs_nothing():
     np.testing.assert_array_equal(np.concatenate(still), 0.0)
 
 
+def test_a_step_is_compared_with_the_same_one_after_the_same_steps():
+    """Where nobody else did it after these, its smaller effect accuses nobody."""
+    pool = toy_changes(demos=8, bad=1, seed=0, step=2)
+    bad = int(worst(pool).argmax())
+    labels = [list(range(len(pool[0])))] * 8
+    labels[bad] = [0, 3, 2, 1, *labels[0][4:]]
+    assert effect_surprises(pool, labels)[bad][2] == 0
+    assert worst(pool)[bad] > 2
+
+
 def test_a_video_is_at_rest_at_the_borders_of_its_segments():
     frames = np.arange(1, 60, 2)
     spans = (Span("a", 4, 20), Span("b", 24, 41), Span("c", 41, 60))

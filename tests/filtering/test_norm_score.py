@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.weights.mixture import find_populations
 from filtering.weights.norm_score import score_steps
@@ -115,3 +116,12 @@ def test_frames_become_runs_and_background_joins_what_is_around():
     assert found == StepList((2, 0, 1), (3, 1, 2))
     with pytest.raises(ValueError, match="every frame is background"):
         steps_of_frames(np.array([-1, -1]))
+
+
+def test_one_thread_or_two_make_no_difference():
+    pool = counts([USUAL] * 7 + list(MISTAKEN.values()))
+    found = []
+    for limit in (1, 2):
+        with threadpool_limits(limits=limit):
+            found.append(score_steps(pool).losses)
+    assert found[0] == pytest.approx(found[1], abs=1e-6)
