@@ -93,7 +93,7 @@ class DemoOptions:
     """Correct demonstrations (Seq_1)."""
     seq3: int = 4
     """Incorrect demonstrations (Seq_3)."""
-    episodes: int = 4
+    episodes: int = 12
     """Episodes per policy and mode."""
     seed: int = 0
     """Seed of everything that is random."""

@@ -20,6 +20,7 @@ from sklearn.neighbors import NearestCentroid
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from filtering.background import BACKGROUNDS
 from filtering.demo_filter import FilterConfig
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import GeneratorConfig
@@ -61,10 +62,13 @@ def main() -> int:
     parser.add_argument("--backgrounds", nargs="+", default=["none", "median"])
     parser.add_argument("--cache", type=Path, required=True, help="where feature maps are kept")
     parser.add_argument("--pictures", type=Path, help="PNG of what the best channels look at")
+    parser.add_argument("--foregrounds", type=Path, help="PNG of what each background leaves")
     parser.add_argument("--bank", type=Path, help="pool of Seq_1 and Seq_3 to draw pools from")
     parser.add_argument("--pools", type=int, default=30, help="pools that are drawn")
     arguments = parser.parse_args()
     pools = Pool.open(arguments.train), Pool.open(arguments.test)
+    if arguments.foregrounds:
+        draw_foregrounds(arguments, pools[1].episodes[0])
     missed = []
     print(f"{'background':12}{'features':12}{'nearest centroid':>18}{'linear':>8}   accuracy %")
     for background in arguments.backgrounds:
@@ -197,6 +201,15 @@ def draw(
         rows.append(np.hstack([overlay(bottleneck, frames, maps, int(c)) for c in best]))
         print(f"  row {len(rows)}: {span.subtask}, channels {best.tolist()}")
     imageio.imwrite(arguments.pictures, np.vstack(rows))
+
+
+def draw_foregrounds(arguments: argparse.Namespace, episode: Episode) -> None:
+    """Write a row per background: the middle of every other segment without it."""
+    spans = episode.spans()[::2]
+    chosen = np.array([(span.start + span.stop) // 2 for span in spans])
+    clip = episode.video(arguments.camera)
+    rows = [np.hstack(foreground(clip, chosen, name)) for name in BACKGROUNDS]
+    imageio.imwrite(arguments.foregrounds, np.vstack(rows))
 
 
 def _margins(generator: FeatureGenerator, clips: Sequence, labels: np.ndarray) -> np.ndarray:

@@ -48,7 +48,7 @@ class DemoConfig:
     """Correct demonstrations (Seq_1)."""
     seq3: int = 4
     """Incorrect demonstrations (Seq_3)."""
-    episodes: int = 4
+    episodes: int = 12
     """Evaluation episodes per policy and mode."""
     seed: int = 0
     """Seed of the pool, the filter and the learner."""
