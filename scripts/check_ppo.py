@@ -1,0 +1,75 @@
+"""Learning curves of PPO in the sub-task environment: from a cloned policy, and from nothing.
+
+POLICY is a folder of `teasim train --observe state`. Both learn in the same few scenes; what was
+done in a scene before is not simulated again. The reward of an episode is 1 when tea was made.
+"""
+
+import argparse
+import sys
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from stable_baselines3 import PPO
+from stable_baselines3.common.monitor import Monitor
+
+from policies.checkpoint import load_policy
+from policies.networks import one_thread
+from policies.remembering import Remembering
+from policies.rollout import EnvironmentConfig, make_environment
+from policies.sb3 import as_ppo
+from policies.subtask_policy import SubtaskPolicy
+
+SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "learning_rate": 3e-4, "seed": 0}
+
+
+class Scenes(gym.Wrapper[Any, Any, Any, Any]):
+    """Starts some scenes by turns, whatever seed is asked for."""
+
+    def __init__(self, env: gym.Env[Any, Any], count: int) -> None:
+        super().__init__(env)
+        self._seeds = cycle(range(count))
+
+    def reset(self, **_: Any) -> tuple[Any, dict[str, Any]]:
+        """Start the next scene."""
+        return self.env.reset(seed=next(self._seeds))
+
+
+def main() -> int:
+    """Print the mean reward and the mean number of actions of every tenth of the episodes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("policy", type=Path, help="folder of a cloned policy that sees the state")
+    parser.add_argument("--actions", type=int, default=2000, help="sub-tasks tried by each")
+    parser.add_argument("--scenes", type=int, default=4, help="number of scenes")
+    arguments = parser.parse_args()
+    policy = load_policy(arguments.policy)
+    assert isinstance(policy, SubtaskPolicy)
+    for name in ("cloned", "from nothing"):
+        world = make_environment(EnvironmentConfig(), policy.spec)
+        env = Monitor(Scenes(Remembering(world), arguments.scenes))
+        with one_thread():
+            if name == "cloned":
+                model = as_ppo(policy, env, **SETTINGS)
+            else:
+                model = PPO("MultiInputPolicy", env, device="cpu", **SETTINGS)
+            model.learn(arguments.actions)
+        print(f"{name}: {len(env.get_episode_rewards())} episodes")
+        parts = zip(
+            np.array_split(env.get_episode_rewards(), 10),
+            np.array_split(env.get_episode_lengths(), 10),
+            strict=True,
+        )
+        for number, (rewards, lengths) in enumerate(parts, start=1):
+            print(
+                f"  tenth {number:2}: tea made in {100 * np.mean(rewards):5.1f} %, "
+                f"{np.mean(lengths):.1f} actions an episode",
+                flush=True,
+            )
+        env.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
