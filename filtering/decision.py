@@ -26,6 +26,8 @@ VARIETY = 6.0
 """Standard deviations of the lower cluster's sqrt(l) that are still variety."""
 LEAST_SPREAD = 0.1
 """Least standard deviation of the lower cluster's sqrt(l) [sqrt(nats)]."""
+NATURES = ("kept", "out of order", "steps left out")
+"""Groups of demonstrations, the best first; a step of which nothing came is as if left out."""
 
 Array = NDArray[np.float64]
 
@@ -52,18 +54,22 @@ def decide(losses: Array, left_out: NDArray[np.bool_], groups: str) -> Decision:
         ConfigError: there are fewer demonstrations than groups.
     """
     cut = cut_of(losses)
-    numbers = _by_nature(losses > cut, left_out)
+    numbers, names = _by_nature(losses > cut, left_out)
     if groups != "auto" and int(groups) != numbers.max() + 1:
         told = group_weights(-np.sqrt(losses), groups)
-        numbers = told.groups
+        numbers, names = told.groups, told.names
         cut = told.threshold**2 if told.count > 1 else cut
-    return Decision(1 / (1 + (losses / cut) ** 2), Grouping(numbers, 0.5 * (numbers.max() > 0)))
+    grouping = Grouping(numbers, 0.5 * (numbers.max() > 0), names)
+    return Decision(1 / (1 + (losses / cut) ** 2), grouping)
 
 
-def _by_nature(flagged: NDArray[np.bool_], left_out: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Number what is kept 0, what is out of order 1, where steps are left out 2, without gaps."""
+def _by_nature(
+    flagged: NDArray[np.bool_], left_out: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """Number what is kept and the NATURES that there are without gaps; return their names too."""
     natures = np.where(flagged, 1 + left_out, 0)
-    return np.unique(np.append(0, natures), return_inverse=True)[1][1:].astype(np.int64)
+    present, numbers = np.unique(np.append(0, natures), return_inverse=True)
+    return numbers[1:].astype(np.int64), tuple(NATURES[n] for n in present)
 
 
 def cut_of(losses: Array) -> float:

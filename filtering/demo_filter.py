@@ -151,6 +151,7 @@ class DemoFilter:
         probabilities_ (D,): of being incorrect, see `thresholds.probability_incorrect`.
         flagged_ (D,): True where it is called incorrect.
         groups_ (D,): group, 0 is the best.
+        group_names_: what each group has in common; empty where only the weights tell.
         reasons_: a sentence for each flagged demonstration, else "".
         findings_: strange steps of each demonstration, the one that is named first.
         threshold_: weight below which a demonstration is flagged, 0 when nothing is.
@@ -167,6 +168,7 @@ class DemoFilter:
     probabilities_: NDArray[np.float64]
     flagged_: NDArray[np.bool_]
     groups_: NDArray[np.int64]
+    group_names_: tuple[str, ...]
     reasons_: tuple[str, ...]
     findings_: tuple[tuple[Finding, ...], ...]
     threshold_: float
@@ -292,6 +294,7 @@ class DemoFilter:
         self.trust_ = verdict.trust
         self.objective_ = verdict.objective
         self.groups_ = verdict.grouping.groups
+        self.group_names_ = verdict.grouping.names
         self.flagged_ = verdict.grouping.flagged
         self.threshold_ = verdict.grouping.threshold
         self.findings_ = verdict.findings

@@ -124,6 +124,7 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "caution": caution(len(fitted.weights_)),
         "flagged": int(fitted.flagged_.sum()),
         "groups": int(fitted.groups_.max()) + 1,
+        "group_names": list(fitted.group_names_),
         "threshold": fitted.threshold_,
         "objective": fitted.objective_,
         "trusted": float(fitted.trust_.sum()),

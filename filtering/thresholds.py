@@ -41,6 +41,8 @@ class Grouping:
     """(D,) group of each demonstration; 0 has the highest weights and is kept."""
     threshold: float
     """Weight below which a demonstration is flagged; 0 when there is one group."""
+    names: tuple[str, ...] = ()
+    """What the groups have in common, in words; empty where only the weights tell."""
 
     @property
     def flagged(self) -> NDArray[np.bool_]:

@@ -55,8 +55,8 @@ class DemoView:
     """Surprise [nats]."""
     flagged: bool
     """Whether it is called incorrect."""
-    group: int
-    """Its group, 0 is the best."""
+    group: str
+    """What its group has in common, empty where only the weights tell."""
     reason: str
     """One sentence, empty for a kept demonstration."""
     seconds: float

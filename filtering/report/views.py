@@ -41,7 +41,7 @@ def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
         weight=float(fitted.weights_[row]),
         loss=float(fitted.losses_[row]),
         flagged=flagged,
-        group=int(fitted.groups_[row]),
+        group=fitted.group_names_[fitted.groups_[row]] if fitted.group_names_ else "",
         reason=fitted.reasons_[row],
         seconds=clock.time(length),
         segments=tuple(Segment(s.subtask, clock.time(s.start), clock.time(s.stop)) for s in spans),

@@ -55,6 +55,7 @@ def test_what_is_out_of_order_comes_before_what_is_left_out(groups):
     losses = [0.0] * 6 + [2.7] * 4 + [3.1, 6.0]
     found = decide(np.array(losses), np.arange(12) >= 10, groups).grouping
     assert found.groups.tolist() == [0] * 6 + [1] * 4 + [2] * 2
+    assert found.names == ("kept", "out of order", "steps left out")
 
 
 def test_mistakes_of_one_nature_are_one_group_unless_three_are_told():
@@ -63,6 +64,8 @@ def test_mistakes_of_one_nature_are_one_group_unless_three_are_told():
     assert decide(losses, left_out, "auto").grouping.groups.tolist() == [0] * 6 + [1] * 4
     told = decide(losses, left_out, "3").grouping.groups
     assert told.tolist() == [0] * 6 + [1] * 2 + [2] * 2
+    assert decide(losses, left_out, "auto").grouping.names == ("kept", "steps left out")
+    assert decide(losses, left_out, "3").grouping.names == ()
 
 
 def test_told_one_group_flags_nothing_and_told_two_finds_two():

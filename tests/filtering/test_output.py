@@ -94,7 +94,7 @@ def test_page_escapes_what_it_is_told(tmp_path: Path) -> None:
         weight=0.5,
         loss=1.0,
         flagged=True,
-        group=1,
+        group="steps left out",
         reason="<b>bold</b>",
         seconds=2.0,
         segments=(Segment("a<b", 0.0, 2.0),),
