@@ -26,6 +26,8 @@ VARIETY = 6.0
 """Standard deviations of the lower cluster's sqrt(l) that are still variety."""
 LEAST_SPREAD = 0.1
 """Least standard deviation of the lower cluster's sqrt(l) [sqrt(nats)]."""
+DIGITS = 9
+"""Losses that agree to so many decimal places are equal."""
 NATURES = ("kept", "out of order", "steps left out")
 """Groups of demonstrations, the best first; a step of which nothing came is as if left out."""
 
@@ -53,6 +55,7 @@ def decide(losses: Array, left_out: NDArray[np.bool_], groups: str) -> Decision:
     Raises:
         ConfigError: there are fewer demonstrations than groups.
     """
+    losses = losses.round(DIGITS)
     cut = cut_of(losses)
     numbers, names = _by_nature(losses > cut, left_out)
     if groups != "auto" and int(groups) != numbers.max() + 1:
