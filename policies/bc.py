@@ -19,6 +19,11 @@ from policies.subtask_policy import SubtaskPolicy
 from policies.weighting import weigh, weighted_loss, weighted_moments
 from teasim.errors import ConfigError
 
+STEPS_WITH_PICTURES = 120
+"""Gradient steps that are enough for feature maps in several views."""
+STEPS_FROM_STATE = 500
+"""Gradient steps from the few numbers of the state, which tell less and cost little."""
+
 
 @dataclass(frozen=True)
 class BCConfig:
@@ -26,8 +31,9 @@ class BCConfig:
 
     bottleneck: int = 32
     """Channels per camera that the feature maps are reduced to."""
-    steps: int = 120
-    """Gradient steps, each on all decisions in one of their views."""
+    steps: int | None = None
+    """Gradient steps, each on all decisions in one of their views; None: STEPS_WITH_PICTURES, or
+    STEPS_FROM_STATE where there are none."""
     learning_rate: float = 6e-3
     """Step size of AdamW."""
     weight_decay: float = 0.1
@@ -37,7 +43,8 @@ class BCConfig:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value that cannot train."""
-        if self.steps < 1 or self.learning_rate <= 0 or self.weight_decay < 0:
+        too_few = self.steps is not None and self.steps < 1
+        if too_few or self.learning_rate <= 0 or self.weight_decay < 0:
             raise ConfigError(
                 "A learner needs steps >= 1, learning_rate > 0 and weight_decay >= 0."
             )
@@ -104,7 +111,7 @@ def clone(
     weights = torch.from_numpy(shares)
     history = []
     with one_thread():
-        for step in range(config.steps):
+        for step in range(config.steps or _usual_steps(samples)):
             maps = torch.from_numpy(samples.maps[:, step % samples.maps.shape[1]].copy())
             optimizer.zero_grad()
             losses = cross_entropy(logits_of(maps, low_dim), labels, reduction="none")
@@ -113,3 +120,7 @@ def clone(
             optimizer.step()
             history.append(loss.item())
     return tuple(history)
+
+
+def _usual_steps(samples: DecisionSamples) -> int:
+    return STEPS_WITH_PICTURES if samples.spec.cameras else STEPS_FROM_STATE

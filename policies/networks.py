@@ -18,9 +18,9 @@ from torch import Tensor, nn
 
 MAP_SCALE_FLOOR = 0.05
 """Least scale of a channel of the feature maps; one that never changes must not become noise."""
-LOW_DIM_SCALE_FLOOR = 0.05
+LOW_DIM_SCALE_FLOOR = 0.2
 """Least scale of a joint position or another number of the state [its unit]: at rest they hardly
-differ, which means nothing."""
+differ, and things stand a few centimetres elsewhere in every scene, which means nothing."""
 
 Memory = tuple[Tensor, ...]
 """What a network carries from one decision of an episode to the next, (n, H) each; () if nothing.
