@@ -20,9 +20,9 @@ from filtering.output import write_filter_output
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
 from policies.base import DecisionSamples
-from policies.bc import BC, BCConfig
+from policies.bc_rnn import BCRNN, BCRNNConfig
 from policies.checkpoint import save_policy
-from policies.demos import load_decisions
+from policies.demos import DemosConfig, load_decisions
 from policies.evaluation import EvaluationConfig, Scores, evaluate_all
 from policies.experiments.score_section import score_section, sentences
 from policies.results import as_json
@@ -153,24 +153,29 @@ def train_policies(
 ) -> dict[str, SubtaskPolicy]:
     """Clone behaviour from all of `pool`, and again without what the weight `table` flags.
 
-    The second is left out where the filter flags nothing, or everything.
+    From the state, with a memory: what differs between the two is then what they were shown, not
+    what can be made out in a picture. The second is left out where the filter flags nothing, or
+    everything.
     """
     sets = {ALL: demo_weights(pool, table, "ignore")}
     if len({row.flagged for row in read_weight_table(table)}) == 2:
         sets[KEPT] = demo_weights(pool, table, "discard")
-    samples = load_decisions(pool, jobs=jobs)
-    settings = BCConfig(seed=config.seed)
+    samples = load_decisions(pool, DemosConfig(observe="state"), jobs=jobs)
+    settings = BCRNNConfig(seed=config.seed)
     fit = partial(_fit, samples, settings)
     learned = parallel.run(fit, list(sets.values()), jobs=jobs, description="policies")
     policies = dict(zip(sets, learned, strict=True))
     for name, policy in policies.items():
-        training = {"learner": "bc", "settings": asdict(settings), "weights": sets[name].tolist()}
+        weights = sets[name].tolist()
+        training = {"learner": "bc-rnn", "settings": asdict(settings), "weights": weights}
         save_policy(policy, out / name.replace(" ", "_"), training=training)
     return policies
 
 
-def _fit(samples: DecisionSamples, config: BCConfig, weights: NDArray[np.float64]) -> SubtaskPolicy:
-    return BC(config).fit(samples, weights).policy_
+def _fit(
+    samples: DecisionSamples, config: BCRNNConfig, weights: NDArray[np.float64]
+) -> SubtaskPolicy:
+    return BCRNN(config).fit(samples, weights).policy_
 
 
 def write_report(path: Path, pool: Pool, fitted: DemoFilter, findings: Findings) -> None:
