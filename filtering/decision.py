@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.kmeans import clusters
-from filtering.thresholds import Grouping, group_weights
+from filtering.thresholds import DIGITS, Grouping, group_weights
 
 SMALLEST_CUT = 2.0
 """Losses up to this are never flagged unless the number of groups is told [nats]."""
@@ -26,8 +26,6 @@ VARIETY = 6.0
 """Standard deviations of the lower cluster's sqrt(l) that are still variety."""
 LEAST_SPREAD = 0.1
 """Least standard deviation of the lower cluster's sqrt(l) [sqrt(nats)]."""
-DIGITS = 9
-"""Losses that agree to so many decimal places are equal."""
 NATURES = ("kept", "out of order", "steps left out")
 """Groups of demonstrations, the best first; a step of which nothing came is as if left out."""
 

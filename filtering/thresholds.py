@@ -25,6 +25,8 @@ MIN_GAP = 0.5
 MIN_GAP_OF_THREE = 0.25
 """Least distance between neighbouring means of three groups [weight]."""
 
+DIGITS = 9
+"""Weights and losses that agree to so many decimal places are equal."""
 LEAST_VARIANCE = 1e-4
 """Least variance of a group of weights."""
 LEAST_ROOT_VARIANCE = 0.05
@@ -73,6 +75,7 @@ def group_weights(
     grouper = method_named(method)
     if groups not in GROUPS:
         raise ConfigError(f"Unknown number of groups '{groups}'; choose {', '.join(GROUPS)}.")
+    weights = weights.round(DIGITS)
     if groups == "auto":
         return _chosen_from_data(weights, grouper)
     if int(groups) > len(weights):

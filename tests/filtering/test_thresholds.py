@@ -112,6 +112,13 @@ def test_every_method_orders_its_groups_and_ignores_the_order_of_the_pool(
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("groups", ["auto", "2", "3"])
+def test_rounding_makes_no_groups(method: str, groups: str) -> None:
+    weights = np.array([0.5, 0.5, 0.5 + 1e-12, 1e-200 + 0.5])
+    assert not group_weights(weights, groups, method).flagged.any()
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_no_method_flags_in_a_clean_pool(method: str) -> None:
     for weights in (np.ones(5), np.array([1.0, 1.0, 0.9, 0.8, 0.7])):
         assert not group_weights(weights, "auto", method).flagged.any()
