@@ -22,7 +22,7 @@ from policies.rollout import EnvironmentConfig, make_environment
 from policies.sb3 import as_ppo
 from policies.subtask_policy import SubtaskPolicy
 
-SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "learning_rate": 3e-4, "seed": 0}
+SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "learning_rate": 1e-4, "seed": 0}
 
 
 class Scenes(gym.Wrapper[Any, Any, Any, Any]):
