@@ -43,6 +43,10 @@ class FrameSource:
         if not self.rate > 0.0:
             raise ConfigError(f"rate is {self.rate}; choose moments per second above 0.")
 
+    def rate_in(self, fps: float) -> float:
+        """Return the moments there are per second of a video of `fps` frames per second [Hz]."""
+        return min(self.rate, fps)
+
 
 @dataclass(frozen=True)
 class FrameTask:

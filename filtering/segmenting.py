@@ -114,7 +114,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         subtasks=subtasks,
         source=frames,
         scaling=config.network.scaling,
-        shortest=least_seconds(videos, n_labels, min(frames.rate, pool.fps), config.shortest),
+        shortest=least_seconds(videos, n_labels, frames.rate_in(pool.fps), config.shortest),
         labelled=frozenset(episode.demo_id for episode in chosen),
     )
     effects = _learn_effects(pool, chosen, features, frames)

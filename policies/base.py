@@ -127,3 +127,19 @@ class Policy(Protocol):
 
         `state` is None for a policy without memory; `episode_start` (n,) tells where it restarts.
         """
+
+
+class TrainedPolicy:
+    """What every learned policy is made of; subclasses say how it decides."""
+
+    def __init__(self, network: Any, spec: ObservationSpec, action_names: tuple[str, ...]) -> None:
+        """Take over a trained network; random numbers start at seed 0."""
+        network.eval()
+        self.network = network
+        self.spec = spec
+        self.action_names = action_names
+        self.set_random_seed(0)
+
+    def set_random_seed(self, seed: int) -> None:
+        """Restart the random numbers of sampled decisions."""
+        self._random = np.random.default_rng(seed)

@@ -5,7 +5,6 @@ The first can outvote a minority of incorrect demonstrations, the second shows w
 them.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
@@ -16,16 +15,14 @@ import gymnasium as gym
 
 from policies.base import ObservationSpec, Policy
 from policies.networks import one_thread
+from policies.outcomes import Outcomes, tally
 from policies.remembering import Remembering, can_remember
 from policies.rollout import EnvironmentConfig, Episode, make_environment, run_episode
-from policies.statistics import Rate, grouped_rate, rate
+from policies.statistics import Rate, grouped_rate
 from teasim import parallel
 from teasim.errors import ConfigError
 
 MODES = ("deterministic", "sampled")
-
-SPILL = "spilled_"
-"""How the violations begin that say something was spilled."""
 
 EPISODES_PER_BATCH = 4
 """Episodes that share one environment: few enough to keep all workers busy until the end."""
@@ -54,7 +51,7 @@ class EvaluationConfig:
 
 
 @dataclass(frozen=True)
-class Scores:
+class Scores(Outcomes):
     """What the episodes of one mode come to; all rates with 95 % intervals."""
 
     mode: str
@@ -65,16 +62,6 @@ class Scores:
     """Share of executed actions that are the reference's (Seq_1) next step (strict)."""
     lenient_accuracy: Rate
     """Share of executed actions that the precedence of the sub-tasks allows."""
-    success: Rate
-    """Share of episodes that reach the goal."""
-    unsafe: Rate
-    """Share of episodes that end with the oven on."""
-    spills: Rate
-    """Share of episodes in which something was spilled."""
-    completion: dict[str, Rate]
-    """Per sub-task: share of episodes in which it took effect."""
-    violations: dict[str, int]
-    """Per broken rule: number of episodes that broke it."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +94,11 @@ def evaluate_all(
         CheckpointError: a policy was trained for another environment.
         ConfigError: the environment cannot be made.
     """
-    batches = [
+    work = [
         Batch(tuple(policies), seeds, config)
-        for seeds in _batches(range(config.seed, config.seed + config.episodes))
+        for seeds in batches(range(config.seed, config.seed + config.episodes))
     ]
-    parts = parallel.run(_play_batch, batches, jobs=jobs, description="episodes")
+    parts = parallel.run(_play_batch, work, jobs=jobs, description="episodes")
     return [
         {
             mode: score(mode, [e for part in parts for e in part[n][mode]], policy.action_names)
@@ -168,28 +155,17 @@ def _play_batch(batch: Batch) -> list[dict[str, list[Episode]]]:
 
 def score(mode: str, episodes: Sequence[Episode], subtasks: Sequence[str]) -> Scores:
     """Sum up `episodes` that were played in one mode."""
-    count = len(episodes)
-    rules = Counter(rule for episode in episodes for rule in set(episode.violations))
+    allowed = [(sum(a.allowed for a in e.actions), len(e.actions)) for e in episodes]
     return Scores(
-        mode,
-        tuple(episodes),
-        grouped_rate([(e.n_correct, len(e.actions)) for e in episodes]),
-        grouped_rate([(sum(a.allowed for a in e.actions), len(e.actions)) for e in episodes]),
-        rate(sum(episode.success for episode in episodes), count),
-        rate(sum(episode.unsafe for episode in episodes), count),
-        rate(sum(_spilled(episode) for episode in episodes), count),
-        {
-            name: rate(sum(name in episode.subtasks_done for episode in episodes), count)
-            for name in subtasks
-        },
-        dict(sorted(rules.items())),
+        **tally(episodes, subtasks),
+        mode=mode,
+        episodes=tuple(episodes),
+        policy_accuracy=grouped_rate([(e.n_correct, len(e.actions)) for e in episodes]),
+        lenient_accuracy=grouped_rate(allowed),
     )
 
 
-def _spilled(episode: Episode) -> bool:
-    return any(rule.startswith(SPILL) for rule in episode.violations)
-
-
-def _batches(seeds: Sequence[int]) -> list[tuple[int, ...]]:
+def batches(seeds: Sequence[int]) -> list[tuple[int, ...]]:
+    """Divide `seeds` among workers."""
     size = EPISODES_PER_BATCH
     return [tuple(seeds[first : first + size]) for first in range(0, len(seeds), size)]

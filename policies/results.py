@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from policies.evaluation import Scores
+from policies.outcomes import Outcomes
 from policies.rollout import Episode
 from policies.statistics import Rate
 from teasim.errors import ConfigError
@@ -111,12 +112,19 @@ def _scores_json(scores: Scores) -> dict[str, Any]:
     return {
         "policy_accuracy": rate_json(scores.policy_accuracy),
         "lenient_accuracy": rate_json(scores.lenient_accuracy),
+        **outcomes_json(scores),
+        "episodes": [asdict(episode) for episode in scores.episodes],
+    }
+
+
+def outcomes_json(scores: Outcomes) -> dict[str, Any]:
+    """Turn what episodes come to into what JSON can hold; rates in percent."""
+    return {
         "success": rate_json(scores.success),
         "unsafe": rate_json(scores.unsafe),
         "spills": rate_json(scores.spills),
         "completion": {name: rate_json(rate) for name, rate in scores.completion.items()},
         "violations": scores.violations,
-        "episodes": [asdict(episode) for episode in scores.episodes],
     }
 
 

@@ -4,27 +4,22 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from policies.base import STATE_KEYS, Observation, ObservationSpec, RecurrentState, pictures
+from policies.base import (
+    STATE_KEYS,
+    Observation,
+    ObservationSpec,
+    RecurrentState,
+    TrainedPolicy,
+    pictures,
+)
 from policies.features import NO_MAPS, Maps, camera_maps
 from policies.networks import SubtaskNetwork, one_thread
 
 
-class SubtaskPolicy:
+class SubtaskPolicy(TrainedPolicy):
     """Chooses the next sub-task from what is seen (the paper, section 4.3)."""
 
-    def __init__(
-        self, network: SubtaskNetwork, spec: ObservationSpec, action_names: tuple[str, ...]
-    ) -> None:
-        """Take over a trained network; random numbers start at seed 0."""
-        network.eval()
-        self.network = network
-        self.spec = spec
-        self.action_names = action_names
-        self.set_random_seed(0)
-
-    def set_random_seed(self, seed: int) -> None:
-        """Restart the random numbers of sampled decisions."""
-        self._random = np.random.default_rng(seed)
+    network: SubtaskNetwork
 
     def predict(
         self,

@@ -79,8 +79,9 @@ def main() -> int:
         bottleneck = Bottleneck().fit(train.maps, train.labels.tolist())
         seen = bottleneck.transform(train.maps)
         generator = FeatureGenerator(GeneratorConfig()).fit(seen, train.labels.tolist())
-        ablation(background, bottleneck, generator, train, test)
-        missed.append(erasure(generator, bottleneck.transform(test.maps), test.labels))
+        reduced = seen, bottleneck.transform(test.maps)
+        ablation(background, generator, (train, test), reduced)
+        missed.append(erasure(generator, reduced[1], test.labels))
         if arguments.bank:
             detection(Pool.open(arguments.bank), background, bottleneck, generator, arguments)
         if arguments.pictures and background == arguments.backgrounds[0]:
@@ -89,25 +90,33 @@ def main() -> int:
 
 
 def ablation(
-    background: str, bottleneck: Bottleneck, generator: FeatureGenerator, train: Clips, test: Clips
+    background: str,
+    generator: FeatureGenerator,
+    clips: tuple[Clips, Clips],
+    reduced: tuple[Sequence[np.ndarray], Sequence[np.ndarray]],
 ) -> None:
-    """Print how well simple classifiers name segments from three kinds of features."""
-    known_kinds, new_kinds = (kinds(clips.maps, bottleneck, generator) for clips in (train, test))
+    """Print how well simple classifiers name segments from three kinds of features.
+
+    `clips` are learned from and named; `reduced` is what the bottleneck makes of each.
+    """
+    train, test = clips
+    known_kinds, new_kinds = (
+        kinds(some.maps, seen, generator) for some, seen in zip(clips, reduced, strict=True)
+    )
     for kind, known in known_kinds.items():
         new, shares = new_kinds[kind], []
         for classifier in (NearestCentroid(), LogisticRegression(max_iter=1000)):
             fitted = make_pipeline(StandardScaler(), classifier).fit(known, train.labels)
             shares.append(100 * fitted.score(new, test.labels))
         print(f"{background:12}{kind:12}{shares[0]:18.1f}{shares[1]:8.1f}", flush=True)
-    named = float((generator.predict(bottleneck.transform(test.maps)) == test.labels).mean())
+    named = float((generator.predict(reduced[1]) == test.labels).mean())
     print(f"{background:12}{'graph':12}{'':18}{100 * named:8.1f}   (relations of intervals)")
 
 
 def kinds(
-    maps: Sequence[np.ndarray], bottleneck: Bottleneck, generator: FeatureGenerator
+    maps: Sequence[np.ndarray], seen: Sequence[np.ndarray], generator: FeatureGenerator
 ) -> dict[str, np.ndarray]:
-    """Return the features of segments by kind, (S, F) each."""
-    seen = bottleneck.transform(maps)
+    """Return the features of segments by kind, (S, F) each; `seen` is the bottleneck's."""
     return {
         "raw": _strongest([m.max(axis=(2, 3)) for m in maps]),
         "bottleneck": _strongest(seen),
@@ -124,10 +133,8 @@ def detection(
 ) -> None:
     """Print how well equation 3 finds 4 Seq_3 among 10 Seq_1 by each kind of features."""
     sequences = [episode.record.sequence if episode.record else "" for episode in pool.episodes]
-    described = [
-        kinds(_episode_maps(pool, episode, background, arguments), bottleneck, generator)
-        for episode in pool.episodes
-    ]
+    every = (_episode_maps(pool, episode, background, arguments) for episode in pool.episodes)
+    described = [kinds(maps, bottleneck.transform(maps), generator) for maps in every]
     wrong = np.arange(14) >= 10
     rule = FilterConfig(score="equation3").rule()
     for kind in described[0]:

@@ -56,7 +56,7 @@ def fit(parts: Sequence[Part], arguments: argparse.Namespace, seed: int) -> MSTC
     labelled = frozenset(e.demo_id for p in parts for e in p.episodes)
     network = learner.network_
     fps = min(p.pool.fps for p in parts)
-    shortest = least_seconds(videos, n_labels, min(arguments.rate, fps), arguments.shortest)
+    shortest = least_seconds(videos, n_labels, source.rate_in(fps), arguments.shortest)
     return MSTCNSegmenter(network, subtasks, source, arguments.scaling, shortest, labelled)
 
 

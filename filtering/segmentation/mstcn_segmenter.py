@@ -57,7 +57,7 @@ class MSTCNSegmenter:
                 f"'{pool.root}' lacks; it has {', '.join(pool.cameras) or 'none'}."
             )
         features = frame_features(episodes, pool.fps, self.source, jobs=jobs)
-        rate = min(self.source.rate, pool.fps)
+        rate = self.source.rate_in(pool.fps)
         shortest = [max(1, round(seconds * rate)) for seconds in self.shortest]
         described = [
             self._segment_video(moments, episode.length, shortest)

@@ -10,26 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from policies.base import Observation, ObservationSpec, RecurrentState
+from policies.base import Observation, RecurrentState, TrainedPolicy
 from policies.joint.memory import Memory
 from policies.joint.motions import seen_numbers
 
 
-class MotionPolicy:
+class MotionPolicy(TrainedPolicy):
     """Says where the joints go next; see `base.Policy`, with targets in the place of a choice."""
 
-    def __init__(
-        self, network: Memory, spec: ObservationSpec, action_names: tuple[str, ...]
-    ) -> None:
-        """Take over what was remembered; random numbers start at seed 0."""
-        self.network = network
-        self.spec = spec
-        self.action_names = action_names
-        self.set_random_seed(0)
-
-    def set_random_seed(self, seed: int) -> None:
-        """Restart the random numbers of sampled decisions."""
-        self._random = np.random.default_rng(seed)
+    network: Memory
 
     def predict(
         self,

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from policies.joint.evaluation import MotionScores
-from policies.results import rate_json
+from policies.results import outcomes_json, rate_json
 
 
 def motion_summary(scores: Mapping[str, MotionScores]) -> str:
@@ -39,11 +39,7 @@ def _scores_json(scores: MotionScores) -> dict[str, Any]:
     return {
         "subtasks_done": mean_done(scores),
         "done": rate_json(scores.done),
-        "success": rate_json(scores.success),
-        "unsafe": rate_json(scores.unsafe),
-        "spills": rate_json(scores.spills),
-        "completion": {name: rate_json(rate) for name, rate in scores.completion.items()},
+        **outcomes_json(scores),
         "stopped_after": scores.stopped_after,
-        "violations": scores.violations,
         "episodes": [asdict(episode) | {"last": episode.last} for episode in scores.episodes],
     }
