@@ -22,7 +22,7 @@ from policies.rollout import EnvironmentConfig, make_environment
 from policies.sb3 import as_ppo
 from policies.subtask_policy import SubtaskPolicy
 
-SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "learning_rate": 1e-4, "seed": 0}
+SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "seed": 0}
 
 
 class Scenes(gym.Wrapper[Any, Any, Any, Any]):
@@ -43,7 +43,9 @@ def main() -> int:
     parser.add_argument("policy", type=Path, help="folder of a cloned policy that sees the state")
     parser.add_argument("--actions", type=int, default=2000, help="sub-tasks tried by each")
     parser.add_argument("--scenes", type=int, default=4, help="number of scenes")
+    parser.add_argument("--learning-rate", type=float, default=1e-4, help="step size of PPO")
     arguments = parser.parse_args()
+    settings = SETTINGS | {"learning_rate": arguments.learning_rate}
     policy = load_policy(arguments.policy)
     assert isinstance(policy, SubtaskPolicy)
     for name in ("cloned", "from nothing"):
@@ -51,9 +53,9 @@ def main() -> int:
         env = Monitor(Scenes(Remembering(world), arguments.scenes))
         with one_thread():
             if name == "cloned":
-                model = as_ppo(policy, env, **SETTINGS)
+                model = as_ppo(policy, env, **settings)
             else:
-                model = PPO("MultiInputPolicy", env, device="cpu", **SETTINGS)
+                model = PPO("MultiInputPolicy", env, device="cpu", **settings)
             model.learn(arguments.actions)
         print(f"{name}: {len(env.get_episode_rewards())} episodes")
         parts = zip(

@@ -68,51 +68,32 @@ def decode(
     logs = np.log(np.maximum(posteriors.astype(np.float64), TINY))
     sums = np.vstack([np.zeros(logs.shape[1]), np.cumsum(logs, axis=0)])
     # best[t, c]: the first t frames with a last run of label c that is long enough; began[t, c]:
-    # where that run begins, and after[t, c]: the label before it, -1 for none.
-    best = np.full(sums.shape, -np.inf)
-    began, after = np.zeros(sums.shape, np.int64), np.full(sums.shape, -1)
+    # where that run begins.
+    best, began = np.full(sums.shape, -np.inf), np.zeros(sums.shape, np.int64)
+    best[0] = 0.0
     for stop in range(1, len(sums)):
         for label, least in enumerate(shortest):
             start = stop - least
             if start < 0:
                 continue
-            before, value = _best_before(best, start, label)
-            fresh = value + sums[stop, label] - sums[start, label]
-            longer = best[stop - 1, label] + logs[stop - 1, label]
+            fresh = best[start].max() + sums[stop, label] - sums[start, label]
+            longer = best[stop - 1, label] + logs[stop - 1, label] if stop > 1 else -np.inf
             best[stop, label] = max(longer, fresh)
-            if longer >= fresh:
-                start, before = began[stop - 1, label], after[stop - 1, label]
-            began[stop, label], after[stop, label] = start, before
-    return _trace(best, began, after, sums)
+            began[stop, label] = began[stop - 1, label] if longer >= fresh else start
+    if np.isfinite(best[-1]).any():
+        return _trace(best, began)
+    return np.full(len(posteriors), sums[-1].argmax())
 
 
-def _best_before(best: NDArray[np.float64], start: int, label: int) -> tuple[int, float]:
-    """Return the label of the run that ends at `start` before one of `label`, and its value."""
-    if start == 0:
-        return -1, 0.0
-    others = best[start].copy()
-    others[label] = -np.inf  # two runs of one label would be one
-    place = int(others.argmax())
-    return place, float(others[place])
-
-
-def _trace(
-    best: NDArray[np.float64],
-    began: NDArray[np.int64],
-    after: NDArray[np.int64],
-    sums: NDArray[np.float64],
-) -> NDArray[np.int64]:
+def _trace(best: NDArray[np.float64], began: NDArray[np.int64]) -> NDArray[np.int64]:
     """Go back from the end over the best runs."""
     labels = np.zeros(len(best) - 1, dtype=np.int64)
-    label = int(best[-1].argmax())
-    if not np.isfinite(best[-1, label]):
-        labels[:] = sums[-1].argmax()
-        return labels
     stop = len(labels)
     while stop > 0:
-        start, before = began[stop, label], after[stop, label]
+        label = best[stop].argmax()
+        start = int(began[stop, label])
         labels[start:stop] = label
-        stop, label = int(start), int(before)
+        stop = start
     return labels
 
 

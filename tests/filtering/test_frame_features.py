@@ -30,6 +30,11 @@ def test_moments_per_second(length, fps, rate, count):
     assert sample_count(length, fps, rate) == count
 
 
+def test_no_more_moments_than_frames():
+    assert FrameSource(("left",), 5.0).rate_in(10.0) == 5.0
+    assert FrameSource(("left",), 30.0).rate_in(10.0) == 10.0
+
+
 def test_at_half_the_rate_every_second_frame_is_looked_at():
     assert sampled_frames(8, 4).tolist() == [1, 3, 5, 7]
     assert moment_of_frames(8, 4).tolist() == [0, 0, 1, 1, 2, 2, 3, 3]

@@ -118,6 +118,16 @@ def test_frames_become_runs_and_background_joins_what_is_around():
         steps_of_frames(np.array([-1, -1]))
 
 
+def test_of_three_groups_told_only_the_lowest_is_trusted():
+    """Told two, those out of order are near enough to the norm beside two steps left out."""
+    order, gross = (0, 2, 1, 3, 4, 5, 6), (0, 1, 2, 3, 4)
+    pool = counts([USUAL] * 6 + [order] * 4 + [gross] * 2)
+    two, three = (score_steps(pool, n_groups=number) for number in (2, 3))
+    assert two.losses[6:10].max() < three.losses[6:10].min()
+    assert three.trust[6:].max() < two.trust[6:10].min()
+    np.testing.assert_array_equal(score_steps(pool).losses, two.losses)
+
+
 def test_one_thread_or_two_make_no_difference():
     pool = counts([USUAL] * 7 + list(MISTAKEN.values()))
     found = []
