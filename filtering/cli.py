@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from teasim.errors import ConfigError, TeasimError
+from teasim.common.errors import ConfigError, TeasimError
 
 
 @dataclass(frozen=True)
@@ -156,9 +156,9 @@ def run(arguments: FilterArguments) -> int:
     """
     from filtering.demo_filter import DemoFilter, FilterConfig, caution
     from filtering.output import check_output, write_filter_output
-    from filtering.segmentation.sequence_pool import SequencePool, open_source
-    from filtering.weights.precedence import read_precedence
-    from teasim import parallel
+    from teasim.pool.sequences import SequencePool, open_source
+    from filtering.judging.norm.precedence import read_precedence
+    from teasim.common import parallel
 
     if not 0.0 <= arguments.max_flagged <= 1.0:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
@@ -202,8 +202,8 @@ def run(arguments: FilterArguments) -> int:
 def _fit(arguments: FitArguments) -> int:
     from filtering.segmentation.mstcn_training import MSTCNConfig
     from filtering.segmentation.scoring import scores_table
-    from filtering.segmenting import FitConfig, fit_segmenter
-    from teasim import parallel
+    from filtering.segmentation.fitting import FitConfig, fit_segmenter
+    from teasim.common import parallel
 
     config = FitConfig(
         episodes=arguments.episodes,
@@ -237,8 +237,8 @@ def _fit(arguments: FitArguments) -> int:
 
 def _predict(arguments: PredictArguments) -> int:
     from filtering.segmentation.scoring import scores_table
-    from filtering.segmenting import predict
-    from teasim import parallel
+    from filtering.segmentation.fitting import predict
+    from teasim.common import parallel
 
     jobs = arguments.jobs or parallel.default_jobs()
     scores = predict(arguments.segmenter, arguments.source, arguments.out, jobs=jobs)

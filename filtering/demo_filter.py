@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.background import subtraction_named
+from filtering.vision.background import subtraction_named
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
-from filtering.explain import Finding, explain
+from filtering.judging.explain import Finding, explain
 from filtering.features.description import POOLED, check_description, describe_segments
 from filtering.features.reduction import reduce_features
-from filtering.frame_features import FrameSource
-from filtering.frames import chosen_cameras, main_camera
+from filtering.vision.frame_features import FrameSource
+from filtering.vision.frames import chosen_cameras, main_camera
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
-from filtering.segmentation.sequence_pool import SequencePool, Source
-from filtering.thresholds import GROUPS, METHODS, probability_incorrect
-from filtering.verdict import Evidence, Rule, Verdict, judge_named
-from filtering.weights.precedence import Pairs
-from filtering.weights.solvers import solver_named
-from teasim.errors import ConfigError
+from teasim.pool.sequences import SequencePool, Source
+from filtering.judging.thresholds import GROUPS, METHODS, probability_incorrect
+from filtering.judging.verdict import Evidence, Rule, Verdict, judge_named
+from filtering.judging.norm.precedence import Pairs
+from filtering.judging.equation3.solvers import solver_named
+from teasim.common.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow
 

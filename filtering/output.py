@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.demo_filter import DemoFilter, caution
-from filtering.explain import Clock
+from filtering.judging.explain import Clock
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
-from filtering.segmentation.sequence_pool import SequencePool, Source
-from teasim.errors import ConfigError, TeasimError
+from teasim.pool.sequences import SequencePool, Source
+from teasim.common.errors import ConfigError, TeasimError
 from teasim.pool import Pool
-from teasim.pool.files import write_json, write_text
+from teasim.common.files import write_json, write_text
 from teasim.pool.weight_table import write_weight_table
 
 FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")

@@ -9,12 +9,12 @@ from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
-from policies.base import ObservationSpec
-from policies.joint.memory import Memory, MemoryShape
-from policies.joint.policy import MotionPolicy
-from policies.networks import DecisionNetwork, Ensemble, NetworkShape, RecurrentNetwork
-from policies.subtask_policy import SubtaskPolicy
-from teasim.pool.checkpoint import CheckpointKind
+from policies.data.samples import ObservationSpec
+from policies.learners.chunks import Memory, MemoryShape
+from policies.learners.motion_policy import MotionPolicy
+from policies.learners.networks import DecisionNetwork, Ensemble, NetworkShape, RecurrentNetwork
+from policies.learners.subtask_policy import SubtaskPolicy
+from teasim.common.checkpoint import CheckpointKind
 
 POLICY = CheckpointKind("policy", 2, held="trained policy", remedy="train again")
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from teasim.parallel import default_jobs
+from teasim.common.parallel import default_jobs
 
 if TYPE_CHECKING:
-    from policies.joint.policy import MotionPolicy
-    from policies.subtask_policy import SubtaskPolicy
+    from policies.learners.motion_policy import MotionPolicy
+    from policies.learners.subtask_policy import SubtaskPolicy
 
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 
@@ -136,7 +136,7 @@ def evaluate(argv: Sequence[str]) -> int:
     """Run a trained policy in the environment and score it."""
     options = tyro.cli(EvaluateOptions, args=list(argv), prog="teasim evaluate")
     from policies.checkpoint import load_policy
-    from policies.joint.policy import MotionPolicy
+    from policies.learners.motion_policy import MotionPolicy
     from policies.outputs import check_file
 
     check_file(options.json)
@@ -149,10 +149,10 @@ def evaluate(argv: Sequence[str]) -> int:
 
 def _evaluate_subtasks(policy: "SubtaskPolicy", options: EvaluateOptions) -> int:
     """Run a policy over sub-tasks and score its choices."""
-    from policies.comparison import compare, comparison_json, comparison_text
-    from policies.evaluation import EvaluationConfig, evaluate_all
-    from policies.results import Bar, summary, write_junit, write_scores
-    from policies.rollout import ENVIRONMENT, EnvironmentConfig
+    from policies.play.comparison import compare, comparison_json, comparison_text
+    from policies.play.evaluation import EvaluationConfig, evaluate_all
+    from policies.play.results import Bar, summary, write_junit, write_scores
+    from policies.play.rollout import ENVIRONMENT, EnvironmentConfig
 
     bar = None if options.min_policy_accuracy is None else Bar(options.min_policy_accuracy)
     world = EnvironmentConfig(
@@ -180,8 +180,8 @@ def _evaluate_subtasks(policy: "SubtaskPolicy", options: EvaluateOptions) -> int
 def _load_rival(run: Path) -> "SubtaskPolicy":
     """Read a policy that one over sub-tasks can be compared with."""
     from policies.checkpoint import load_policy
-    from policies.joint.policy import MotionPolicy
-    from teasim.errors import ConfigError
+    from policies.learners.motion_policy import MotionPolicy
+    from teasim.common.errors import ConfigError
 
     policy = load_policy(run)
     if isinstance(policy, MotionPolicy):
@@ -193,13 +193,13 @@ def _load_rival(run: Path) -> "SubtaskPolicy":
 
 def _evaluate_joints(policy: "MotionPolicy", options: EvaluateOptions) -> int:
     """Run a policy of the joint level and score how far it gets."""
-    from policies.evaluation import EvaluationConfig
-    from policies.joint.evaluation import evaluate_motion
-    from policies.joint.results import motion_json, motion_summary
-    from policies.joint.rollout import JOINT_ENVIRONMENT
-    from policies.rollout import EnvironmentConfig
-    from teasim.errors import ConfigError
-    from teasim.pool.files import write_json
+    from policies.play.evaluation import EvaluationConfig
+    from policies.play.joint_evaluation import evaluate_motion
+    from policies.play.joint_results import motion_json, motion_summary
+    from policies.play.joint_rollout import JOINT_ENVIRONMENT
+    from policies.play.rollout import EnvironmentConfig
+    from teasim.common.errors import ConfigError
+    from teasim.common.files import write_json
 
     asked = (options.min_policy_accuracy, options.against, options.junit, options.video)
     if any(option is not None for option in asked):

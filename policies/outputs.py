@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 
 def check_file(path: Path | None) -> None:

@@ -5,7 +5,7 @@ environment of `sb3_environment`. A policy without memory that sees the state ca
 that does the same, and then learn from its own attempts:
 
     from policies.checkpoint import load_policy
-    from policies.rollout import EnvironmentConfig
+    from policies.play.rollout import EnvironmentConfig
     from policies.sb3 import as_ppo, sb3_environment
 
     policy = load_policy(Path("policy"))          # teasim train POOL --observe state -o policy
@@ -27,11 +27,11 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor
 
-from policies.base import STATE_KEYS, ObservationSpec
-from policies.networks import DecisionNetwork
-from policies.rollout import EnvironmentConfig, make_environment
-from policies.subtask_policy import SubtaskPolicy
-from teasim.errors import ConfigError
+from policies.data.samples import STATE_KEYS, ObservationSpec
+from policies.learners.networks import DecisionNetwork
+from policies.play.rollout import EnvironmentConfig, make_environment
+from policies.learners.subtask_policy import SubtaskPolicy
+from teasim.common.errors import ConfigError
 
 
 class FlatPictures(gym.ObservationWrapper[Any, Any, Any]):

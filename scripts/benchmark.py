@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from teasim.parallel import WORKER_ENVIRONMENT
+from teasim.common.parallel import WORKER_ENVIRONMENT
 
 os.environ.update(WORKER_ENVIRONMENT)  # one thread, before OpenGL and NumPy start
 

@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.baselines import BASELINES
+from filtering.judging.baselines import BASELINES
 from filtering.demo_filter import FilterConfig
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
-from filtering.frame_features import FrameSource
+from filtering.vision.frame_features import FrameSource
 from filtering.segmentation.segmenter import segmenter_named
-from filtering.verdict import Evidence, Verdict, by_norm
-from filtering.weights.steps import StepList
-from policies.statistics import wilson_interval
+from filtering.judging.verdict import Evidence, Verdict, by_norm
+from filtering.judging.norm.steps import StepList
+from teasim.common.statistics import wilson_interval
 from teasim.pool import Pool, Span
 from teasim.pool.leakage import auroc
 from teasim.task.recipes import PRECEDENCE

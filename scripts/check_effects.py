@@ -14,8 +14,8 @@ import numpy as np
 from filtering.effects.reader import balanced_accuracy, effect_states, fit_effects
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
-from filtering.frame_features import FrameSource
-from teasim.parallel import default_jobs
+from filtering.vision.frame_features import FrameSource
+from teasim.common.parallel import default_jobs
 from teasim.pool import Pool
 from teasim.pool.leakage import auroc
 

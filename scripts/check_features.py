@@ -20,7 +20,7 @@ from sklearn.neighbors import NearestCentroid
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from filtering.background import BACKGROUNDS
+from filtering.vision.background import BACKGROUNDS
 from filtering.demo_filter import FilterConfig
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import GeneratorConfig
@@ -30,8 +30,8 @@ from filtering.features.generator import FeatureGenerator
 from filtering.features.maps import segment_maps
 from filtering.features.pictures import overlay
 from filtering.features.reduction import reduce_features
-from filtering.frames import segment_indices
-from filtering.verdict import Evidence, by_equation_3
+from filtering.vision.frames import segment_indices
+from filtering.judging.verdict import Evidence, by_equation_3
 from teasim.pool import Episode, Pool
 from teasim.pool.leakage import auroc
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from filtering.demo_filter import DemoFilter, FilterConfig
 from teasim.generate import GenerateConfig, generate
-from teasim.parallel import default_jobs
+from teasim.common.parallel import default_jobs
 from teasim.pool import Pool
 
 

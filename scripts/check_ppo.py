@@ -16,11 +16,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 
 from policies.checkpoint import load_policy
-from policies.networks import one_thread
-from policies.remembering import Remembering
-from policies.rollout import EnvironmentConfig, make_environment
+from policies.learners.networks import one_thread
+from policies.play.remembering import Remembering
+from policies.play.rollout import EnvironmentConfig, make_environment
 from policies.sb3 import as_ppo
-from policies.subtask_policy import SubtaskPolicy
+from policies.learners.subtask_policy import SubtaskPolicy
 
 SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "seed": 0}
 

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.baselines import BASELINES
-from filtering.decision import cut_of
-from filtering.segmentation.mstcn_folder import MSTCNFolder
-from filtering.thresholds import probability_incorrect
-from filtering.weights.norm_score import score_steps
-from filtering.weights.steps import StepList, count_steps, steps_of_frames
+from filtering.judging.baselines import BASELINES
+from filtering.judging.clusters import cut_of
+from teasim.pool.mstcn import MSTCNFolder
+from filtering.judging.thresholds import probability_incorrect
+from filtering.judging.norm.norm_score import score_steps
+from filtering.judging.norm.steps import StepList, count_steps, steps_of_frames
 from teasim.pool.leakage import auroc
 
 DRESSING = ("add_oil", "add_vinegar", "add_salt", "add_pepper", "mix_dressing")

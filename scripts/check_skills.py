@@ -11,10 +11,10 @@ from functools import partial
 
 import numpy as np
 
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.generate.plan import DemoPlan
 from teasim.generate.recording import mismatch
-from teasim.parallel import default_jobs, run
+from teasim.common.parallel import default_jobs, run
 from teasim.rollout import demonstrate
 from teasim.task.mistakes import Plan, spoil
 from teasim.task.recipes import (

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from teasim.errors import RenderError
+from teasim.common.errors import RenderError
 
 BACKENDS = ("egl", "osmesa")
 USER_CHOICES = (*BACKENDS, "glfw", "glx")

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import CAMERAS, QUALITIES
-from teasim.errors import ConfigError, RenderError
+from teasim.common.errors import ConfigError, RenderError
 from teasim.gl import choose_gl
 from teasim.world.dressing import apply_look
 from teasim.world.liquids import VESSELS, Stream

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from teasim.parallel import WORKER_ENVIRONMENT
+from teasim.common.parallel import WORKER_ENVIRONMENT
 
 # Before torch or a renderer is loaded: the processes of the test run are the parallelism.
 for name, value in WORKER_ENVIRONMENT.items():

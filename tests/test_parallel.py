@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from teasim.errors import WorkerError
-from teasim.parallel import run
+from teasim.common.errors import WorkerError
+from teasim.common.parallel import run
 
 
 def die(item: int) -> int:

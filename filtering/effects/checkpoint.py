@@ -10,10 +10,10 @@ from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 
 from filtering.effects.reader import Effect, EffectReader
-from filtering.frame_features import FrameSource
-from filtering.pretrained import describe_fitted, feature_recipe
-from teasim.errors import ConfigError
-from teasim.pool.checkpoint import CheckpointKind
+from filtering.vision.frame_features import FrameSource
+from filtering.vision.pretrained import describe_fitted, feature_recipe
+from teasim.common.errors import ConfigError
+from teasim.common.checkpoint import CheckpointKind
 
 EFFECTS = CheckpointKind("effects", 1, held="effect reader", remedy="fit again")
 PER_EFFECT = ("errors", "accuracies", "certainties")

@@ -22,8 +22,8 @@ from sklearn.covariance import ledoit_wolf
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.effects.rests import change_scales
-from filtering.frame_features import FrameSource
-from teasim.errors import ConfigError
+from filtering.vision.frame_features import FrameSource
+from teasim.common.errors import ConfigError
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.cache import ArrayCache, default_folder
-from filtering.frame_features import (
+from filtering.vision.cache import ArrayCache, default_folder
+from filtering.vision.frame_features import (
     FrameSource,
     clip_key,
     describe_clip,

@@ -13,10 +13,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from filtering.determinism import one_thread, seeded
+from filtering.vision.determinism import one_thread, seeded
 from filtering.features.config import BottleneckConfig
 from filtering.features.training import class_labels, predict_logits, train
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 SCALE_FLOOR = 0.05
 """Least scale of a channel of the feature maps; one that never changes must not become noise."""

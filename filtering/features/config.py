@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 LAYERS = ("relations", "nodes")
 """Kinds of graph layers: relational ones, or ones that see each node alone."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.features.extraction import segment_features
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.pool import Pool, Span
 
 POOLED = "pooled"

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.background import subtraction_named
-from filtering.cache import ArrayCache, default_folder
-from filtering.frame_features import clip_key, look_up_or_describe, side_by_side
-from filtering.frames import Frames, fit_size, segment_indices, uniform_indices
+from filtering.vision.background import subtraction_named
+from filtering.vision.cache import ArrayCache, default_folder
+from filtering.vision.frame_features import clip_key, look_up_or_describe, side_by_side
+from filtering.vision.frames import Frames, fit_size, segment_indices, uniform_indices
 from teasim.pool import Pool, Span, VideoClip, read_frames
 
 OVERVIEW = 31
@@ -68,7 +68,7 @@ def segment_features(
 
 def describe_video(task: VideoTask) -> NDArray[np.float32]:
     """Return the features (n, FRAME_FEATURES) of the n frames of `task`, and cache them."""
-    from filtering.backbone import describe_frames
+    from filtering.vision.backbone import describe_frames
 
     features = describe_frames(foreground(task.clip, _frames_of(task), task.background))
     ArrayCache(task.cache_folder).put(_key(task), features)

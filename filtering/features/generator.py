@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.features.config import GeneratorConfig
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 if TYPE_CHECKING:
     from filtering.features.intervals import Activations, Intervals

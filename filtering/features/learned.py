@@ -14,8 +14,8 @@ from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import BottleneckConfig, GeneratorConfig
 from filtering.features.generator import FeatureGenerator
 from filtering.features.maps import segment_maps
-from teasim import parallel
-from teasim.errors import ConfigError
+from teasim.common import parallel
+from teasim.common.errors import ConfigError
 from teasim.pool import Episode, Pool, Span, VideoClip
 
 

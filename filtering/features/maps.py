@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.features.extraction import foreground
-from filtering.frames import Frames, segment_indices
+from filtering.vision.frames import Frames, segment_indices
 from teasim.pool import Span, VideoClip
 
 Maps = NDArray[np.float16]
@@ -30,8 +30,8 @@ def frame_maps(frames: Frames) -> Maps:
     """Return the stride-16 feature maps (n, C, h, w) of frames (n, H, W, 3)."""
     import torch
 
-    from filtering.backbone import BATCH, feature_maps
-    from filtering.determinism import one_thread
+    from filtering.vision.backbone import BATCH, feature_maps
+    from filtering.vision.determinism import one_thread
 
     with one_thread(), torch.inference_mode():
         parts = [

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.features.bottleneck import Bottleneck, FeatureMaps
-from filtering.frames import Frames
+from filtering.vision.frames import Frames
 
 STRENGTH = 0.6
 """Opacity of the strongest activation over the frame."""

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
-from filtering.determinism import one_thread
+from filtering.vision.determinism import one_thread
 from filtering.features.config import TrainingConfig
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 Forward = Callable[[Sequence[int]], Tensor]
 """Logits (b, T) of the clips with the given numbers."""

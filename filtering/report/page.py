@@ -9,8 +9,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from filtering.report.layout import Dot, Mark, place_dots, place_marks
-from teasim.errors import TeasimError
-from teasim.pool.files import write_text
+from teasim.common.errors import TeasimError
+from teasim.common.files import write_text
 
 PALETTE = (
     "#d9822b",

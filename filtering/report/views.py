@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from filtering.demo_filter import DemoFilter
-from filtering.explain import Clock, Finding, gravest
+from filtering.judging.explain import Clock, Finding, gravest
 from filtering.report.layout import Mark
 from filtering.report.page import DemoView, Segment
-from filtering.segmentation.sequence_pool import SequencePool, Source
+from teasim.pool.sequences import SequencePool, Source
 from teasim.pool import VideoClip, read_frames
 from teasim.pool.videos import VideoWriter, video_content
 

@@ -8,14 +8,14 @@ from typing import Any
 from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 
-from filtering.determinism import seeded
-from filtering.frame_features import FrameSource
-from filtering.pretrained import describe_fitted, feature_recipe
+from filtering.vision.determinism import seeded
+from filtering.vision.frame_features import FrameSource
+from filtering.vision.pretrained import describe_fitted, feature_recipe
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.scaling import SCALINGS
-from teasim.errors import ConfigError
-from teasim.pool.checkpoint import CheckpointKind
+from teasim.common.errors import ConfigError
+from teasim.common.checkpoint import CheckpointKind
 
 SEGMENTER = CheckpointKind("segmenter", 2, held="segmenter", remedy="fit again")
 

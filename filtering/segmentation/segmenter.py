@@ -5,7 +5,7 @@ from pathlib import Path
 
 from filtering.segmentation.clustering import AUTO, clustering, subtask_count
 from filtering.segmentation.segments import Segmentation, Segmenter
-from teasim.errors import ConfigError, PoolError
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Episode, Pool, Span
 
 

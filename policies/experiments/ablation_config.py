@@ -26,12 +26,12 @@ from pathlib import Path
 from typing import Any, Self
 
 from filtering.demo_filter import FilterConfig
-from policies.demos import DemosConfig
-from policies.evaluation import EvaluationConfig
-from policies.learners import find_learner
-from policies.rollout import EnvironmentConfig
-from policies.weighting import USES
-from teasim.errors import ConfigError
+from policies.data.demos import DemosConfig
+from policies.play.evaluation import EvaluationConfig
+from policies.learners.registry import find_learner
+from policies.play.rollout import EnvironmentConfig
+from policies.data.weighting import USES
+from teasim.common.errors import ConfigError
 
 LABELS = "labels"
 """The use of the pool's own verdicts, as good as a filter can be; the one that reads them."""

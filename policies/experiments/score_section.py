@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from html import escape
 
-from policies.evaluation import Scores
-from policies.statistics import Rate
+from policies.play.evaluation import Scores
+from teasim.common.statistics import Rate
 
 Comparison = Mapping[str, Mapping[str, Scores]]
 """Training set -> mode -> scores; the others are compared with the first training set."""

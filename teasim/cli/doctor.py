@@ -14,7 +14,7 @@ import numpy as np
 import tyro
 
 from teasim.gl import BACKENDS, FIXES, Probe, probe
-from teasim.parallel import default_jobs
+from teasim.common.parallel import default_jobs
 
 PACKAGES = (
     "teasim",

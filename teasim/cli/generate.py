@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from teasim.errors import ConfigError
-from teasim.parallel import default_jobs
+from teasim.common.errors import ConfigError
+from teasim.common.parallel import default_jobs
 
 if TYPE_CHECKING:
     from teasim.generate import GenerateConfig

@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         PoolError: There is no pool at the path, or leakage is asked for without labels.
     """
     config = tyro.cli(InspectConfig, prog="teasim inspect", args=argv)
-    from teasim.errors import PoolError
+    from teasim.common.errors import PoolError
     from teasim.pool import Pool
     from teasim.pool.integrity import check_pool
 
@@ -84,7 +84,7 @@ def _description(pool: Pool) -> str:
 
 
 def _row(pool: Pool, episode: Episode) -> list[str]:
-    from teasim.errors import PoolError
+    from teasim.common.errors import PoolError
 
     start = [str(episode.index), _or_unknown(lambda: episode.demo_id)]
     seconds = f"{episode.length / pool.fps:.1f}"
@@ -109,7 +109,7 @@ def _verdict(n_problems: int) -> str:
 
 def _or_unknown(read: Callable[[], str]) -> str:
     """What `read` returns; unknown where damage, which is listed below, keeps it from us."""
-    from teasim.errors import PoolError
+    from teasim.common.errors import PoolError
 
     try:
         return read()

@@ -17,7 +17,7 @@ import traceback
 from collections.abc import Sequence
 from importlib.metadata import EntryPoint, entry_points, version
 
-from teasim.errors import TeasimError
+from teasim.common.errors import TeasimError
 
 GROUP = "teasim.verbs"
 

@@ -15,7 +15,7 @@ from teasim.constants import (
     GRIPPER_SQUEEZE,
     STATE_NAMES,
 )
-from teasim.errors import ConfigError, named
+from teasim.common.errors import ConfigError, named
 from teasim.world.yumi import JOINT_SPEEDS
 
 DELTA_SHARE = 0.85

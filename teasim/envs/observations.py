@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from teasim.constants import STATE_NAMES
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.render import StationRenderer
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
 from teasim.envs.registration import MAX_SECONDS
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.task.scoring import Verdict
 from teasim.world.collisions import CollisionCounter
 from teasim.world.simulation import Simulation

@@ -8,7 +8,7 @@ from gymnasium import spaces
 
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
 from teasim.envs.base import StationEnv
-from teasim.errors import ConfigError, SkillError
+from teasim.common.errors import ConfigError, SkillError
 from teasim.rollout import run_subtask
 from teasim.skills.arm import Style
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.render import check_cameras, check_look
 from teasim.skills.demonstrators import PARTICIPANTS, Participant
 from teasim.task.mistakes import Plan, spoil

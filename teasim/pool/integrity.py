@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from teasim.errors import PoolError
-from teasim.pool.files import sha256_of
+from teasim.common.errors import PoolError
+from teasim.common.files import sha256_of
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.metadata import require_pool_folder
 from teasim.pool.lerobot.reader import Episode, Pool

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool.lerobot import Episode, Pool
 from teasim.pool.videos import read_frames
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 
 NO_SUBTASK = -1
 """`subtask_index` of a frame that belongs to no sub-task."""

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 
 # No B-frames and a key frame every 10: presentation order is file order, and readers that jump to
 # a frame decode ten at most. bitexact keeps the encoder's version out of the file.

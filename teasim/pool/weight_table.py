@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from teasim.errors import PoolError
-from teasim.pool.files import write_text
+from teasim.common.errors import PoolError
+from teasim.common.files import write_text
 
 
 @dataclass(frozen=True)

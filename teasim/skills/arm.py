@@ -7,7 +7,7 @@ import numpy as np
 from mink import SE3
 
 from teasim.constants import ARMS, CONTROL_TIMESTEP, GRIPPER_SQUEEZE
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.skills.geometry import (
     EASE_PEAK,
     between,

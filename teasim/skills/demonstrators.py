@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from teasim.constants import ARMS
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.skills.arm import Style
 from teasim.task.recipes import SEQ_1, is_legal
 from teasim.world.embodiments import EMBODIMENTS

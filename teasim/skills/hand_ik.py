@@ -3,7 +3,7 @@
 import numpy as np
 from mink import SE3
 
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.skills.geometry import about, pose, position, rotation
 from teasim.world.person import HAND_RANGE, POINTING_DOWN
 

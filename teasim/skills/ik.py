@@ -9,7 +9,7 @@ import mink
 import numpy as np
 
 from teasim.constants import ARM_JOINTS
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.skills.geometry import position
 from teasim.skills.hand_ik import HandKinematics
 from teasim.world.yumi import READY, planning_model

@@ -3,7 +3,7 @@
 import numpy as np
 from mink import SE3
 
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.skills.arm import Arm, Motion
 from teasim.skills.geometry import UP, pose, rotation, shifted, tool
 from teasim.task.mistakes import ABANDONED, INEFFECTIVE, Manner

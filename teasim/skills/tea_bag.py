@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.skills.arm import Arm, Motion
 from teasim.skills.geometry import DOWN, UP, pose, position, rotation, shifted, tool
 from teasim.task.mistakes import ABANDONED, INEFFECTIVE, Manner

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from teasim.errors import ConfigError, named
+from teasim.common.errors import ConfigError, named
 from teasim.task.recipes import CRITICAL, POURED, PRECEDENCE, check_subtask, recognisable
 
 Manner = Literal["well", "ineffective", "abandoned"]

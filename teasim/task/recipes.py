@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 
 from teasim.constants import SUBTASKS
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 SEQ_1 = (
     "turn_on_oven",

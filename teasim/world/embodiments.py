@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARM_JOINTS
-from teasim.errors import named
+from teasim.common.errors import named
 from teasim.world.person import (
     HAND_JOINTS,
     HAND_RANGE,

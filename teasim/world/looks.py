@@ -10,7 +10,7 @@ from math import isfinite
 import numpy as np
 
 from teasim.constants import CAMERAS
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 Colour = tuple[float, float, float]
 """Red, green and blue, 0 to 1."""

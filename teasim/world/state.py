@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 _KEPT = mujoco.mjtState.mjSTATE_INTEGRATION
 # Pictures and skills see the poses of the last physics step's beginning, not those of its end.

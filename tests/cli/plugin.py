@@ -12,7 +12,7 @@ SOURCE = '''
 
 import sys
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 
 
 def echo(arguments):

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from teasim import gl
-from teasim.errors import RenderError
+from teasim.common.errors import RenderError
 
 pytestmark = pytest.mark.skipif(
     platform.system() != "Linux", reason="elsewhere MuJoCo renders without our help"

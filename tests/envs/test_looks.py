@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.world.segments import SEGMENT_NAMES
 
 NAME = "teasim:teasim/TeaMaking-v0"

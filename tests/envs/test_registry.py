@@ -11,7 +11,7 @@ from teasim.envs.actions import CONTROLS
 from teasim.envs.observations import OBS_TYPES
 from teasim.envs.registration import register_envs
 from teasim.envs.rewards import RewardWeights
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 
 VARIANTS = {control: ("TeaMaking", {"control": control}) for control in CONTROLS}
 VARIANTS["subtasks"] = ("TeaMakingSubtasks", {})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from teasim.constants import SUBTASKS
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.task.recipes import SEQ_1
 
 TURN_ON, ADD_WATER, _, _, ADD_TEA_BAG, STIR, TURN_OFF = range(7)

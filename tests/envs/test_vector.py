@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from teasim.envs.registration import register_envs
-from teasim.errors import RenderError
+from teasim.common.errors import RenderError
 
 VIEW = {
     "obs_type": "pixels",

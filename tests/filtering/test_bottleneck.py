@@ -10,7 +10,7 @@ import torch
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.checkpoint import load_bottleneck, save_bottleneck
 from filtering.features.config import BottleneckConfig, TrainingConfig
-from teasim.errors import CheckpointError, ConfigError
+from teasim.common.errors import CheckpointError, ConfigError
 
 MAP_CHANNELS = 12
 CONFIG = BottleneckConfig(channels=6, training=TrainingConfig(epochs=12, learning_rate=1e-2))

@@ -13,7 +13,7 @@ from filtering.segmentation import clustering as module
 from filtering.segmentation.clustering import AVERAGES, subtask_count
 from filtering.segmentation.segmenter import SEGMENTERS, segmenter_named
 from filtering.segmentation.segments import Segmentation
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.pool import Episode, Pool
 from tests.filtering.test_discovery import made_up
 from tests.toy_pool import make_toy_pool

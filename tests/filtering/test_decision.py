@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.decision import SMALLEST_CUT, cut_of, decide
+from filtering.judging.clusters import SMALLEST_CUT, cut_of, decide
 
 losses_of = st.lists(st.floats(0, 30), min_size=3, max_size=12)
 

@@ -7,8 +7,8 @@ import pytest
 
 from filtering.demo_filter import DemoFilter, FilterConfig
 from filtering.segmentation.segmenter import segmenter_named
-from filtering.verdict import JUDGES
-from teasim.errors import ConfigError, PoolError
+from filtering.judging.verdict import JUDGES
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool
 from tests.filtering.conftest import TOY_SEQUENCES
 from tests.toy_pool import SEQ_1, make_toy_pool, strip_ground_truth

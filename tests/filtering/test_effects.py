@@ -16,8 +16,8 @@ from filtering.effects.reader import (
 )
 from filtering.effects.rests import changes, look_at_rests, rest_features, rest_moments
 from filtering.effects.surprise import effect_surprises
-from filtering.frame_features import FrameSource, frame_features
-from teasim.errors import CheckpointError, ConfigError
+from filtering.vision.frame_features import FrameSource, frame_features
+from teasim.common.errors import CheckpointError, ConfigError
 from teasim.pool import Pool, Span
 from tests.toy_pool import SEQ_1, SEQ_2
 

@@ -1,6 +1,6 @@
 from dataclasses import replace
 
-from filtering.explain import Finding, explain, gravest
+from filtering.judging.explain import Finding, explain, gravest
 from teasim.pool import Span
 
 OFF_LEFT_OUT = Finding("turn_off_oven", "add_water", Span("add_milk", 382, 451), 451, True, 6.0)

@@ -3,16 +3,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtering import frame_features as module
-from filtering.backbone import FRAME_FEATURES, describe_frames
-from filtering.frame_features import (
+from filtering.vision import frame_features as module
+from filtering.vision.backbone import FRAME_FEATURES, describe_frames
+from filtering.vision.frame_features import (
     FrameSource,
     frame_features,
     moment_of_frames,
     sample_count,
     sampled_frames,
 )
-from teasim.errors import ConfigError, PoolError
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool, read_frames
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from filtering.features.config import ClassifierConfig, GeneratorConfig
 from filtering.features.generator import FeatureGenerator
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from tests.filtering.toy_intervals import (
     CHANNELS,
     PLACES,

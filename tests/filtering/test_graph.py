@@ -14,7 +14,7 @@ from filtering.features.graph import interval_graph
 from filtering.features.intervals import Intervals, find_intervals, mean_thresholds
 from filtering.features.relations import Relation
 from filtering.features.rgcn import LAYER_KINDS, GraphClassifier
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from tests.filtering.toy_intervals import (
     CHANNELS,
     LENGTHS,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.kmeans import clusters, kmeans
+from filtering.judging.kmeans import clusters, kmeans
 
 values_of = st.lists(st.integers(-20, 20), min_size=1, max_size=10)
 

@@ -22,8 +22,8 @@ from filtering.features.learned import LookConfig, learn_features
 from filtering.features.maps import frame_maps, segment_maps
 from filtering.features.pictures import overlay
 from filtering.segmentation.mstcn_training import MSTCNConfig
-from filtering.segmenting import FitConfig, fit_segmenter
-from teasim.errors import CheckpointError, ConfigError
+from filtering.segmentation.fitting import FitConfig, fit_segmenter
+from teasim.common.errors import CheckpointError, ConfigError
 from teasim.pool import Pool
 from tests.toy_pool import make_toy_pool
 

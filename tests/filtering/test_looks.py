@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import torch
 
-from filtering.backbone import FRAME_FEATURES, SameConv, describe_frames, load_backbone
-from filtering.background import GREY, subtraction_named
-from filtering.cache import ArrayCache
+from filtering.vision.backbone import FRAME_FEATURES, SameConv, describe_frames, load_backbone
+from filtering.vision.background import GREY, subtraction_named
+from filtering.vision.cache import ArrayCache
 from filtering.features.extraction import segment_features
 from filtering.features.reduction import MAX_COMPONENTS, reduce_features
-from filtering.frames import fit_size, uniform_indices
-from teasim.errors import ConfigError
+from filtering.vision.frames import fit_size, uniform_indices
+from teasim.common.errors import ConfigError
 from teasim.pool import Pool
 
 
@@ -89,7 +89,7 @@ def test_pretrained_weights_recognise_a_daisy() -> None:
     """Class 985 of ImageNet; wrong padding, scaling or folding loses it."""
     from sklearn.datasets import load_sample_image  # type: ignore[import-untyped]
 
-    from filtering.pretrained import weights_path
+    from filtering.vision.pretrained import weights_path
 
     picture = fit_size(load_sample_image("flower.jpg")[None, :, 107:534])
     stored = torch.load(weights_path(), weights_only=True)

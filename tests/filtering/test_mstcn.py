@@ -23,7 +23,7 @@ from filtering.segmentation.mstcn_training import (
     rearrange,
 )
 from filtering.segmentation.scaling import scaled
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.pool.types import runs
 
 SMALL = MSTCNConfig(

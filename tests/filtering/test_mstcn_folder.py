@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from filtering.segmentation.mstcn_folder import MSTCNFolder, is_mstcn_folder, write_predictions
-from teasim.errors import PoolError
+from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
+from teasim.common.errors import PoolError
 from tests.filtering.conftest import real_data
 
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.weights.mixture import find_populations
-from filtering.weights.norm_score import score_steps
-from filtering.weights.steps import StepList, count_steps, steps_of_frames
+from filtering.judging.norm.mixture import find_populations
+from filtering.judging.norm.norm_score import score_steps
+from filtering.judging.norm.steps import StepList, count_steps, steps_of_frames
 from teasim.pool.leakage import auroc
 
 T = 7

@@ -8,7 +8,7 @@ from filtering.demo_filter import DemoFilter
 from filtering.output import FILES, write_filter_output
 from filtering.report import DemoView, Mark, ReportSection, Segment, render_report
 from filtering.report.layout import place_dots, place_marks
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import read_weight_table
 

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from filtering.decision import cut_of
+from filtering.judging.clusters import cut_of
 from filtering.demo_filter import DemoFilter, FilterConfig
-from filtering.segmentation.mstcn_folder import write_predictions
-from filtering.segmentation.sequence_pool import SequencePool
-from filtering.weights.norm_score import score_steps
-from filtering.weights.precedence import precedence_graph, read_precedence
-from filtering.weights.steps import StepList, count_steps
-from teasim.errors import ConfigError
+from teasim.pool.mstcn import write_predictions
+from teasim.pool.sequences import SequencePool
+from filtering.judging.norm.norm_score import score_steps
+from filtering.judging.norm.precedence import precedence_graph, read_precedence
+from filtering.judging.norm.steps import StepList, count_steps
+from teasim.common.errors import ConfigError
 from tests.toy_pool import SEQ_1
 
 USUAL, LEGAL, WRONG, SHORT = (

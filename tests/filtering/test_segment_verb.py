@@ -9,13 +9,13 @@ import pytest
 from filtering.cli import main as filter_verb
 from filtering.cli import segment
 from filtering.demo_filter import DemoFilter, FilterConfig
-from filtering.frame_features import FrameSource, frame_features
+from filtering.vision.frame_features import FrameSource, frame_features
 from filtering.segmentation.mstcn_checkpoint import load_segmenter
-from filtering.segmentation.mstcn_folder import MSTCNFolder, write_predictions
+from teasim.pool.mstcn import MSTCNFolder, write_predictions
 from filtering.segmentation.mstcn_training import MSTCNConfig
 from filtering.segmentation.scoring import score_episodes
-from filtering.segmenting import FitConfig, FitResult, fit_segmenter, predict
-from teasim.errors import ConfigError, PoolError, TeasimError
+from filtering.segmentation.fitting import FitConfig, FitResult, fit_segmenter, predict
+from teasim.common.errors import ConfigError, PoolError, TeasimError
 from teasim.pool import Episode, Pool, Span
 from tests.filtering.conftest import TOY_SEQUENCES
 from tests.toy_pool import SEQ_1, make_toy_pool

@@ -16,7 +16,7 @@ from filtering.segmentation.metrics import (
     segmentation_scores,
     subtask_accuracy,
 )
-from filtering.segmentation.mstcn_folder import MSTCNFolder
+from teasim.pool.mstcn import MSTCNFolder
 from tests.filtering.conftest import real_data
 
 

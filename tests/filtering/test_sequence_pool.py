@@ -10,12 +10,12 @@ import pytest
 from filtering.cli import main
 from filtering.demo_filter import DemoFilter, FilterConfig
 from filtering.output import FILES
-from filtering.segmentation.mstcn_folder import write_predictions
-from filtering.segmentation.sequence_pool import SequencePool, joined_spans, open_source
-from filtering.verdict import JUDGES
-from filtering.weights.norm_score import score_steps
-from filtering.weights.steps import count_steps, steps_of_frames
-from teasim.errors import ConfigError, PoolError
+from teasim.pool.mstcn import write_predictions
+from teasim.pool.sequences import SequencePool, joined_spans, open_source
+from filtering.judging.verdict import JUDGES
+from filtering.judging.norm.norm_score import score_steps
+from filtering.judging.norm.steps import count_steps, steps_of_frames
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool, Span
 from teasim.pool.weight_table import read_weight_table
 from tests.filtering.conftest import real_data

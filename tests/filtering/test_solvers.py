@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from filtering.features.reduction import reduce_features
-from filtering.sequence import transitions
-from filtering.weights.alternating import Alternating
-from filtering.weights.annealed import Annealed, trust
-from filtering.weights.exact import MOST, Exact
-from filtering.weights.problem import Problem
-from filtering.weights.published import Published
-from filtering.weights.score import leave_one_out
-from filtering.weights.solver import Solver, concentrate, fill, kinds_of, thinned
-from filtering.weights.solvers import SOLVERS, solver_named
-from teasim.errors import ConfigError
+from filtering.judging.equation3.sequence import transitions
+from filtering.judging.equation3.alternating import Alternating
+from filtering.judging.equation3.annealed import Annealed, trust
+from filtering.judging.equation3.exact import MOST, Exact
+from filtering.judging.equation3.problem import Problem
+from filtering.judging.equation3.published import Published
+from filtering.judging.equation3.score import leave_one_out
+from filtering.judging.equation3.solver import Solver, concentrate, fill, kinds_of, thinned
+from filtering.judging.equation3.solvers import SOLVERS, solver_named
+from teasim.common.errors import ConfigError
 from tests.filtering.simulator import SimulatedPool, pool_of
 
 ORDERS = [[0, 1, 2], [0, 1, 2], [0, 1, 2], [0, 2], [0, 1, 2], [1, 0, 2], [0, 1, 2, 2]]
@@ -195,7 +195,7 @@ def test_curvature_agrees_with_finite_differences_of_the_gradient() -> None:
 def test_newton_and_l_bfgs_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, weights = noisy(5), np.array([1.0, 0.0, 0.5, 1.0, 0.2, 0.0])
     newton = problem.solve(weights)
-    monkeypatch.setattr("filtering.weights.problem.MOST_FOR_NEWTON", 0)
+    monkeypatch.setattr("filtering.judging.equation3.problem.MOST_FOR_NEWTON", 0)
     assert problem.solve(weights) == pytest.approx(newton, abs=1e-4)
 
 
@@ -207,7 +207,7 @@ def test_in_a_large_pool_one_newton_step_leaves_one_out(monkeypatch: pytest.Monk
     weights = np.where(np.arange(60) % 7 == 3, 0.0, 1.0)
     multipliers = problem.solve(weights)
     refitted = leave_one_out(problem, weights, multipliers)
-    monkeypatch.setattr("filtering.weights.score.MOST_REFITS", 0)
+    monkeypatch.setattr("filtering.judging.equation3.score.MOST_REFITS", 0)
     stepped = leave_one_out(problem, weights, multipliers)
     moved = np.abs(refitted - problem.log_probabilities(multipliers)).max()
     assert np.abs(stepped - refitted).max() < 0.2 * moved

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.thresholds import METHODS, group_weights, probability_incorrect
-from teasim.errors import ConfigError
+from filtering.judging.thresholds import METHODS, group_weights, probability_incorrect
+from teasim.common.errors import ConfigError
 
 weight_lists = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=20)
 

@@ -8,7 +8,7 @@ import pytest
 
 import teasim.generate
 from teasim.cli.main import main
-from teasim.errors import RenderError
+from teasim.common.errors import RenderError
 from teasim.generate import recording
 from teasim.task.mistakes import MISTAKES
 from tests.generate.test_pool import SHORT, digests

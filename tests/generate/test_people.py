@@ -6,7 +6,7 @@ import pytest
 import teasim.generate
 from teasim.cli import generate as verb
 from teasim.cli.main import main
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.generate import DemoPlan, GenerateConfig, generate, plan_pool
 from teasim.generate.presets import PRESETS, find_preset
 from teasim.pool import read_frames

@@ -9,7 +9,7 @@ import pytest
 
 import teasim.generate
 from teasim.constants import SUBTASKS
-from teasim.errors import GenerationError, PoolError, SkillError
+from teasim.common.errors import GenerationError, PoolError, SkillError
 from teasim.generate import DemoPlan, GenerateConfig, generate, plan_pool, recording
 from teasim.generate.recording import ATTEMPTS, generate_demo
 from teasim.pool import Pool

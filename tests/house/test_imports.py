@@ -47,7 +47,7 @@ def test_importing_loads_nothing_heavy(module, unwanted):
 
 def test_the_dispatcher_knows_no_room():
     graph = grimp.build_graph(*PACKAGES, include_external_packages=False, cache_dir=None)
-    assert graph.find_modules_directly_imported_by("teasim.cli.main") == {"teasim.errors"}
+    assert graph.find_modules_directly_imported_by("teasim.cli.main") == {"teasim.common.errors"}
 
 
 def modules() -> list[str]:

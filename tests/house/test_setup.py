@@ -27,7 +27,7 @@ case "$*" in
     "-"*)
         echo "probe" >>"$here/calls"
         [ ! -e "$here/libraries" ] || { echo egl; exit; }
-        echo "teasim.errors.RenderError: Nothing renders; run it." >&2
+        echo "teasim.common.errors.RenderError: Nothing renders; run it." >&2
         exit 1 ;;
 esac
 """

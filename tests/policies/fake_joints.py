@@ -6,7 +6,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from policies.rollout import EnvironmentConfig
+from policies.play.rollout import EnvironmentConfig
 from teasim.constants import STATE_NAMES, SUBTASKS
 from teasim.pool import EpisodeRecord, EpisodeWriter, Pool, PoolHeader, Span, finalize_pool
 from tests.policies.fakes import FLAGS, SEQ_1, SIZE, flags

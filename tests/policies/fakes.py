@@ -8,8 +8,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.base import Observation, ObservationSpec, RecurrentState
-from policies.rollout import EnvironmentConfig
+from policies.data.samples import Observation, ObservationSpec, RecurrentState
+from policies.play.rollout import EnvironmentConfig
 from teasim.constants import STATE_NAMES, SUBTASKS
 from teasim.pool import EpisodeRecord, EpisodeWriter, Pool, PoolHeader, Span, finalize_pool
 

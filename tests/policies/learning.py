@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from policies.joint.motions import MotionSamples
-from policies.learners import LEARNERS
+from policies.data.motions import MotionSamples
+from policies.learners.registry import LEARNERS
 
 QUICK = {
     "nearest": {"chunk": 3},

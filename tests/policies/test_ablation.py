@@ -8,7 +8,7 @@ import pytest
 from policies.cli import ablate
 from policies.experiments import ablation, ablation_config
 from policies.experiments.ablation_config import AblationConfig
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from tests.policies.conftest import WITHOUT_TEA_BAG
 from tests.policies.fakes import FAKE_ID, SEQ_1, make_fake_pool
 

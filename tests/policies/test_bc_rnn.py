@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from policies.base import DecisionSamples, ObservationSpec
-from policies.bc_rnn import places
+from policies.data.samples import DecisionSamples, ObservationSpec
+from policies.learners.bc_rnn import places
 from tests.policies.learning import make, replay
 
 SPEC = ObservationSpec((), 0, 0, ("hint",), ("noise",))

@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from policies.base import DecisionSamples, ObservationSpec
+from policies.data.samples import DecisionSamples, ObservationSpec
 from tests.policies.learning import make, replay
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from policies.checkpoint import load_policy, save_policy
-from policies.learners import LEARNERS
-from teasim.errors import CheckpointError
+from policies.learners.registry import LEARNERS
+from teasim.common.errors import CheckpointError
 from tests.policies.learning import make, replay
 
 EVERY = pytest.mark.parametrize("name", LEARNERS)

@@ -7,9 +7,9 @@ import pytest
 
 from policies.checkpoint import load_policy, save_policy
 from policies.cli import evaluate, train
-from policies.learners import LEARNERS
-from policies.rollout import ENVIRONMENT
-from teasim.errors import CheckpointError, ConfigError, PoolError, TeasimError
+from policies.learners.registry import LEARNERS
+from policies.play.rollout import ENVIRONMENT
+from teasim.common.errors import CheckpointError, ConfigError, PoolError, TeasimError
 from teasim.pool.weight_table import WeightRow, write_weight_table
 from tests.policies.fakes import FAKE_ID
 from tests.policies.learning import AT_SUBTASKS

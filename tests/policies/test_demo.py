@@ -8,8 +8,8 @@ import pytest
 from policies.cli import demo as demo_verb
 from policies.experiments import demo
 from policies.experiments.demo import ALL, KEPT, DemoConfig, run_demo
-from policies.rollout import EnvironmentConfig
-from teasim.errors import ConfigError, PoolError
+from policies.play.rollout import EnvironmentConfig
+from teasim.common.errors import ConfigError, PoolError
 from tests.policies.conftest import WITHOUT_TEA_BAG
 from tests.policies.fakes import FAKE_ID, SEQ_1, make_fake_pool
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from policies.base import DecisionSamples, ObservationSpec
-from policies.demodice import DemoDICEConfig, learn_advantages, learn_rewards, make_chain
-from policies.networks import Encoder, NetworkShape
-from teasim.errors import ConfigError
+from policies.data.samples import DecisionSamples, ObservationSpec
+from policies.learners.demodice import DemoDICEConfig, learn_advantages, learn_rewards, make_chain
+from policies.learners.networks import Encoder, NetworkShape
+from teasim.common.errors import ConfigError
 from tests.policies.learning import make
 
 

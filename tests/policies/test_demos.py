@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from policies.base import ObservationSpec
-from policies.demos import DemosConfig, load_decisions
-from policies.features import camera_maps
+from policies.data.samples import ObservationSpec
+from policies.data.demos import DemosConfig, load_decisions
+from policies.data.features import camera_maps
 from teasim.constants import STATE_NAMES, SUBTASKS
-from teasim.errors import ConfigError, PoolError
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import read_frames
 from tests.policies.fakes import FLAGS
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from policies.base import ObservationSpec
-from policies.captions import STRIP, caption
-from policies.evaluation import MODES, EvaluationConfig, evaluate, score
-from policies.rollout import EnvironmentConfig, Episode, make_environment, run_episode
-from policies.statistics import rate
+from policies.data.samples import ObservationSpec
+from policies.play.captions import STRIP, caption
+from policies.play.evaluation import MODES, EvaluationConfig, evaluate, score
+from policies.play.rollout import EnvironmentConfig, Episode, make_environment, run_episode
+from teasim.common.statistics import rate
 from teasim.constants import STATE_NAMES
-from teasim.errors import CheckpointError, ConfigError
+from teasim.common.errors import CheckpointError, ConfigError
 from teasim.pool.videos import VideoClip, count_decodable, read_frames
 from tests.policies.fakes import FAKE_WORLD, FLAGS, SEQ_1, SUBTASKS, ScriptedPolicy
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from policies.learners import LEARNERS, find_learner
-from teasim.errors import ConfigError
+from policies.learners.registry import LEARNERS, find_learner
+from teasim.common.errors import ConfigError
 from tests.policies.learning import AT_SUBTASKS, make, replay
 
 EVERY = pytest.mark.parametrize("name", LEARNERS)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from policies.cli import train
-from policies.joint.motions import load_motions, one_sign, seen_numbers
+from policies.data.motions import load_motions, one_sign, seen_numbers
 from teasim.cli.main import main
 from teasim.constants import STATE_NAMES
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from tests.policies.fakes import FLAGS
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from policies import cli
-from policies.learners import LEARNERS
+from policies.learners.registry import LEARNERS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {name: (DOCS / name).read_text() for name in ("ci.md", "policies.md")}

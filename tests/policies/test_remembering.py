@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from policies import evaluation, remembering
-from policies.evaluation import EvaluationConfig, evaluate, evaluate_all
-from policies.remembering import Remembering, can_remember
-from policies.rollout import make_environment
+from policies.play import evaluation, remembering
+from policies.play.evaluation import EvaluationConfig, evaluate, evaluate_all
+from policies.play.remembering import Remembering, can_remember
+from policies.play.rollout import make_environment
 from tests.policies.fakes import FAKE_WORLD, SEQ_1, FakeTea, ScriptedPolicy
 
 

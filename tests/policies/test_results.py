@@ -5,10 +5,10 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 
-from policies.evaluation import score
-from policies.results import Bar, summary, write_junit, write_scores
-from policies.rollout import Action, Episode
-from teasim.errors import ConfigError
+from policies.play.evaluation import score
+from policies.play.results import Bar, summary, write_junit, write_scores
+from policies.play.rollout import Action, Episode
+from teasim.common.errors import ConfigError
 
 
 def scores_of(*correct):

@@ -2,9 +2,9 @@
 
 import xml.etree.ElementTree as ElementTree
 
-from policies.evaluation import score
+from policies.play.evaluation import score
 from policies.experiments.score_section import score_section, sentences
-from policies.rollout import Action, Episode
+from policies.play.rollout import Action, Episode
 
 
 def scores_of(hits, trials):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from policies.statistics import grouped_rate, rate, wilson_interval
+from teasim.common.statistics import grouped_rate, rate, wilson_interval
 
 # Newcombe (1998), table I, method 3 (score, no continuity correction), 95 %.
 NEWCOMBE = [

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import torch
 
-from policies.base import ObservationSpec
-from policies.features import camera_maps
-from policies.networks import DecisionNetwork, NetworkShape
-from policies.subtask_policy import SubtaskPolicy
+from policies.data.samples import ObservationSpec
+from policies.data.features import camera_maps
+from policies.learners.networks import DecisionNetwork, NetworkShape
+from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.constants import STATE_NAMES, SUBTASKS
 from tests.policies.fakes import SIZE, picture
 

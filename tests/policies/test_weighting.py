@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from policies.weighting import demo_weights, weighted_moments
-from teasim.errors import ConfigError
+from policies.data.weighting import demo_weights, weighted_moments
+from teasim.common.errors import ConfigError
 from teasim.pool.weight_table import WeightRow, write_weight_table
 
 

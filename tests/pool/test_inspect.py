@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from teasim.cli.inspect import main
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool import Pool
 from tests.toy_pool import copy_pool, strip_ground_truth
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool import Pool, read_frames
 from teasim.pool.integrity import check_pool
 from tests.toy_pool import copy_pool, make_toy_pool, rewrite_table

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teasim.cli.inspect import main
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool.leakage import CLUES, auroc, leakage
 from tests.toy_pool import SEQ_1, SEQ_2, copy_pool, make_toy_pool, strip_ground_truth
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool import (
     EpisodeRecord,
     EpisodeWriter,

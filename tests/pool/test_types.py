@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool import EpisodeRecord, MistakeSpan, PoolHeader, Span
 from teasim.pool.types import index_from_spans, spans_from_index
 from tests.toy_pool import toy_header

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool import Pool, VideoClip, read_frames
 from teasim.pool.videos import VideoWriter, count_decodable, video_content
 from tests.toy_pool import COLOURS

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool.weight_table import COLUMNS, WeightRow, read_weight_table, write_weight_table
 
 ROW = WeightRow("ab12", 0, 0.25, 1.5, True, 1, "Stirring is missing, at 12.0 s.")

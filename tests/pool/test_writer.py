@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from teasim.errors import PoolError
-from teasim.parallel import run
+from teasim.common.errors import PoolError
+from teasim.common.parallel import run
 from teasim.pool import (
     EpisodeRecord,
     EpisodeWriter,

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.rollout import demonstrate
 from teasim.skills.demonstrators import OPERATOR, PARTICIPANTS, sample_style, varied
 from teasim.task.mistakes import Plan

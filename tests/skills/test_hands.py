@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teasim.constants import ARMS
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.rollout import run_subtask
 from teasim.skills.arm import Style
 from teasim.skills.geometry import DOWN, pose, position, rotation, tool, turn_angle

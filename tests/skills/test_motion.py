@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teasim.constants import ARMS, CONTROL_TIMESTEP
-from teasim.errors import SkillError
+from teasim.common.errors import SkillError
 from teasim.skills.arm import SPEED_MARGIN, Arm, Style
 from teasim.skills.geometry import (
     DOWN,

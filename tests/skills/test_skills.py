@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from teasim.constants import ARMS, SUBTASKS
-from teasim.errors import ConfigError, SkillError
+from teasim.common.errors import ConfigError, SkillError
 from teasim.rollout import run_subtask
 from teasim.skills.arm import Style
 from teasim.skills.demonstrators import sample_style, varied

@@ -5,7 +5,7 @@ from itertools import permutations
 import pytest
 
 from teasim.constants import SUBTASKS
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.task.recipes import (
     CRITICAL,
     PRECEDENCE,

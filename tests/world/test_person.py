@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teasim.constants import ARMS
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.world.embodiments import EMBODIMENTS, PERSON, find_embodiment
 from teasim.world.monitor import roles
 from teasim.world.person import (

@@ -6,7 +6,7 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
-from teasim.errors import ConfigError
+from teasim.common.errors import ConfigError
 from teasim.skills.arm import Style
 from teasim.skills.library import perform
 from teasim.world.simulation import Simulation

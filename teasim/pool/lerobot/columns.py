@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 
 
 def read_table(

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from teasim.errors import PoolError
-from teasim.pool.files import link_or_copy, sha256_of, sync, write_atomically, write_json
+from teasim.common.errors import PoolError
+from teasim.common.files import link_or_copy, sha256_of, sync, write_atomically, write_json
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, write_table
 from teasim.pool.lerobot.reader import Pool

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import read_table
 

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, read_column
 from teasim.pool.lerobot.identity import demo_id, is_content

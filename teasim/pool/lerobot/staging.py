@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from teasim.errors import PoolError
-from teasim.pool.files import sync, write_json
+from teasim.common.errors import PoolError
+from teasim.common.files import sync, write_json
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import read_table, write_table
 from teasim.pool.lerobot.statistics import ImageHistogram

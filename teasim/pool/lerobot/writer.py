@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 import pyarrow as pa
 
-from teasim.errors import PoolError
+from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.identity import demo_id
 from teasim.pool.lerobot.staging import (

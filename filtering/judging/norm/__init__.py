@@ -1,0 +1,1 @@
+"""The default score: each demonstration against what most of the pool does."""

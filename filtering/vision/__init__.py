@@ -1,0 +1,1 @@
+"""Pictures in, features out: frames, backgrounds, the backbone and its cache."""

@@ -1,0 +1,172 @@
+"""Every video of a pool as a row of features per moment, at a rate of its own, cached."""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filtering.vision.cache import ArrayCache, default_folder
+from filtering.vision.frames import fit_size, uniform_indices
+from filtering.vision.pretrained import feature_recipe
+from teasim.common import parallel
+from teasim.common.errors import ConfigError
+from teasim.pool import Episode, VideoClip, read_frames
+from teasim.pool.videos import video_content
+
+CHUNK = 64
+"""Frames held in memory at a time; a multiple of the backbone's batch: it changes no bit."""
+
+
+@dataclass(frozen=True)
+class FrameSource:
+    """What is looked at in a video."""
+
+    cameras: tuple[str, ...]
+    """Cameras whose features are put side by side."""
+    rate: float = 2.5
+    """Moments looked at per second [Hz]: every fourth frame of a video at 10 frames/s. Twice as
+    many take twice the time and make segments of tea-making no better."""
+
+    def __post_init__(self) -> None:
+        """Refuse a source without pictures.
+
+        Raises:
+            ConfigError: no camera is named, or the rate is not positive.
+        """
+        if not self.cameras:
+            raise ConfigError("No camera was named; choose one or more of the pool's.")
+        if not self.rate > 0.0:
+            raise ConfigError(f"rate is {self.rate}; choose moments per second above 0.")
+
+    def rate_in(self, fps: float) -> float:
+        """Return the moments there are per second of a video of `fps` frames per second [Hz]."""
+        return min(self.rate, fps)
+
+
+@dataclass(frozen=True)
+class FrameTask:
+    """One video to describe; small, so that it travels to a worker process."""
+
+    clip: VideoClip
+    """Where the frames are."""
+    count: int
+    """Moments to look at."""
+    cache_folder: Path
+    """Folder of the feature cache."""
+
+
+class Cached(Protocol):
+    """Something that is done once and kept."""
+
+    @property
+    def cache_folder(self) -> Path:
+        """Folder of the feature cache."""
+
+
+Task = TypeVar("Task", bound=Cached)
+
+
+def sample_count(length: int, fps: float, rate: float) -> int:
+    """Return at how many moments a video of `length` frames is looked at, 1..length."""
+    return min(length, max(1, round(length * rate / fps)))
+
+
+def sampled_frames(length: int, count: int) -> NDArray[np.int64]:
+    """Return the frame of each moment, (count,): the middles of equal parts of the video."""
+    return uniform_indices(0, length, count)
+
+
+def moment_of_frames(length: int, count: int) -> NDArray[np.int64]:
+    """Return for each frame the moment that is nearest, (length,); of two the later."""
+    moments = sampled_frames(length, count)
+    edges = (moments[:-1] + moments[1:] + 1) // 2
+    return np.searchsorted(edges, np.arange(length), side="right")
+
+
+def frame_features(
+    episodes: Sequence[Episode], fps: float, source: FrameSource, *, jobs: int
+) -> list[NDArray[np.float32]]:
+    """Return per demonstration (n, F * cameras), n = sample_count(...).
+
+    Args:
+        episodes: the demonstrations.
+        fps: frames per second of their videos.
+        source: cameras and rate.
+        jobs: worker processes; the result does not depend on it.
+
+    Raises:
+        PoolError: a video is missing or damaged, or there is no such camera.
+    """
+    tasks = [
+        FrameTask(
+            episode.video(camera),
+            sample_count(episode.length, fps, source.rate),
+            default_folder(),
+        )
+        for episode in episodes
+        for camera in source.cameras
+    ]
+    described = look_up_or_describe(tasks, _key, describe_moments, jobs)
+    return side_by_side(described, len(source.cameras))
+
+
+def look_up_or_describe(
+    tasks: Sequence[Task],
+    key: Callable[[Task], str],
+    describe: Callable[[Task], NDArray[np.float32]],
+    jobs: int,
+) -> list[NDArray[np.float32]]:
+    """Return what `describe` gives for each task; workers start only for what is not cached."""
+    known = {n: ArrayCache(task.cache_folder).get(key(task)) for n, task in enumerate(tasks)}
+    unknown = [number for number, features in known.items() if features is None]
+    computed = parallel.run(
+        describe,
+        [tasks[number] for number in unknown],
+        jobs=jobs,
+        description="looking at videos",
+    )
+    known.update(zip(unknown, computed, strict=True))
+    return [features for features in known.values() if features is not None]
+
+
+def side_by_side(videos: Sequence[NDArray[np.float32]], width: int) -> list[NDArray[np.float32]]:
+    """Join every `width` consecutive videos (n, F), the cameras of one demonstration."""
+    return [np.hstack(videos[first : first + width]) for first in range(0, len(videos), width)]
+
+
+def describe_moments(task: FrameTask) -> NDArray[np.float32]:
+    """Return the features (n, F) of the moments of `task`, and cache them."""
+    features = describe_clip(task.clip, sampled_frames(task.clip.length, task.count))
+    ArrayCache(task.cache_folder).put(_key(task), features)
+    return features
+
+
+def describe_clip(clip: VideoClip, wanted: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return the features (n, F) of the frames `wanted` of a clip, in order of time."""
+    from filtering.vision.backbone import describe_frames
+
+    parts = []
+    for first in range(0, len(wanted), CHUNK):
+        indices = wanted[first : first + CHUNK]
+        offset = int(indices[0])
+        rest = VideoClip(clip.path, clip.start_frame + offset, clip.length - offset)
+        parts.append(describe_frames(fit_size(read_frames(rest, indices - offset))))
+    return np.concatenate(parts)
+
+
+def clip_key(clip: VideoClip, recipe: Sequence[Any]) -> str:
+    """Hash the encoded frames of a clip and all that is done to them (anything JSON can hold)."""
+    content = hashlib.sha256()
+    for digest in video_content(clip.path).digests[clip.start_frame :][: clip.length]:
+        content.update(digest)
+    content.update(json.dumps([*feature_recipe(), *recipe]).encode())
+    return content.hexdigest()
+
+
+def _key(task: FrameTask) -> str:
+    return clip_key(task.clip, ["moments", task.clip.length, task.count])

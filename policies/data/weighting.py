@@ -1,0 +1,142 @@
+"""The one place where the weight of a demonstration meets a loss.
+
+The law every learner keeps: weight 0 equals the demonstration removed, weight 2 equals it twice.
+"""
+
+from pathlib import Path
+from typing import Protocol, Self, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from policies.data.samples import DecisionSamples
+from policies.learners.networks import Moments
+from teasim.common.errors import ConfigError
+from teasim.pool import Pool
+from teasim.pool.weight_table import WeightRow, read_weight_table
+
+USES = ("discard", "weight", "ignore")
+"""`discard` drops flagged demonstrations, `weight` takes each at its weight, `ignore` takes all."""
+
+
+def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64]:
+    """Weight of every demonstration of `pool`, (D,); ones without a table.
+
+    Rows are matched by `demo_id`, so a pool whose episodes were re-numbered still fits its table.
+
+    Raises:
+        ConfigError: `use` is unknown or needs a table, the table belongs to another pool, or it
+            leaves no demonstration.
+        PoolError: the table cannot be read.
+    """
+    if use not in USES:
+        raise ConfigError(f"Unknown use '{use}' of weights; choose {', '.join(USES)}.")
+    if table is None and use != "ignore":
+        raise ConfigError(f"Use '{use}' needs a weight table; give one with --weights.")
+    if table is None:
+        return np.ones(len(pool.episodes))
+    rows = _rows_of(pool, table)
+    weights = np.array([_weight(row, use) for row in rows])
+    if not weights.any():
+        raise ConfigError(
+            f"With use '{use}' the weight table '{table}' leaves no demonstration to learn from; "
+            f"choose another use ({', '.join(USES)})."
+        )
+    return weights
+
+
+def likely_experts(pool: Pool, table: Path) -> tuple[int, ...]:
+    """Places in `pool` of the quarter of its demonstrations, at least one, with the largest weight.
+
+    Of equal weights the one with the smaller loss goes first; flagged demonstrations go last.
+
+    Raises:
+        ConfigError: the table belongs to another pool.
+        PoolError: the table cannot be read.
+    """
+    rows = _rows_of(pool, table)
+    order = sorted(range(len(rows)), key=lambda place: _rank(rows[place]))
+    return tuple(sorted(order[: max(1, len(rows) // 4)]))
+
+
+def _rank(row: WeightRow) -> tuple[bool, float, float]:
+    return row.flagged, -row.weight, row.loss
+
+
+def _rows_of(pool: Pool, table: Path) -> list[WeightRow]:
+    """Rows of `table` in the order of the demonstrations of `pool`."""
+    rows = {row.demo_id: row for row in read_weight_table(table)}
+    missing = [episode for episode in pool.episodes if episode.demo_id not in rows]
+    if len(missing) == len(pool.episodes):
+        raise ConfigError(
+            f"The weight table '{table}' is for another pool: "
+            f"it has no demonstration of '{pool.root}'."
+        )
+    if missing:
+        raise ConfigError(
+            f"The weight table '{table}' lacks {len(missing)} of the {len(pool.episodes)} "
+            f"demonstrations of '{pool.root}', the first is episode {missing[0].index}."
+        )
+    return [rows[episode.demo_id] for episode in pool.episodes]
+
+
+def _weight(row: WeightRow, use: str) -> float:
+    if use == "discard":
+        return 0.0 if row.flagged else 1.0
+    return float(row.weight) if use == "weight" else 1.0
+
+
+class Samples(Protocol):
+    """What a learner is given: rows, each from a demonstration."""
+
+    @property
+    def demos(self) -> NDArray[np.int64]:
+        """Position in the pool of each row's demonstration, (n,)."""
+
+    def take(self, rows: NDArray[np.bool_]) -> Self:
+        """Return the rows where `rows` (n,) is true."""
+
+
+Rows = TypeVar("Rows", bound=Samples)
+
+
+def weigh(samples: Rows, weights: NDArray[np.float64]) -> tuple[Rows, NDArray[np.float64]]:
+    """Return the rows that count and the share of the total each one has, (n,), sum 1.
+
+    Args:
+        samples: decisions or control steps of a pool of D demonstrations.
+        weights: weight per demonstration, (D,), not negative.
+
+    Raises:
+        ConfigError: a weight is missing, negative or not finite, or none is positive.
+    """
+    if len(samples.demos) and samples.demos.max() >= len(weights):
+        raise ConfigError(
+            f"{len(weights)} weights do not cover demonstration {samples.demos.max()} of the pool."
+        )
+    if not np.isfinite(weights).all() or (weights < 0).any():
+        raise ConfigError("A demonstration weight is negative or not a number.")
+    each = weights[samples.demos]
+    if not each.any():
+        raise ConfigError("Every demonstration has weight 0, so there is nothing to learn from.")
+    counts = each > 0
+    return samples.take(counts), each[counts] / each.sum()
+
+
+def weighted_loss(losses: torch.Tensor, shares: torch.Tensor) -> torch.Tensor:
+    """Mean of `losses` (n,) under `shares` (n,) that sum to 1, as `weigh` returns them."""
+    return (losses * shares).sum()
+
+
+def weighted_moments(samples: DecisionSamples, shares: NDArray[np.float64]) -> Moments:
+    """Mean and standard deviation of the inputs of `samples` under `shares` (n,) that sum to 1."""
+    rest = (0, 3, 4)  # views and places in the picture
+    means = np.stack([maps.mean(axis=rest, dtype=np.float64) for maps in samples.maps])
+    squares = np.stack([np.square(maps, dtype=np.float64).mean(axis=rest) for maps in samples.maps])
+    map_mean = np.tensordot(shares, means, axes=1)
+    map_variance = np.tensordot(shares, squares, axes=1) - map_mean**2
+    numbers = samples.low_dim.astype(np.float64)
+    mean = shares @ numbers
+    deviation = np.sqrt(shares @ (numbers - mean) ** 2)
+    return Moments(map_mean, np.sqrt(np.maximum(map_variance, 0.0)), mean, deviation)

@@ -1,1 +1,0 @@
-"""The joint level: where the joints go next, ten times a second."""

@@ -1,0 +1,72 @@
+"""A policy over joint targets: it follows a demonstration, and looks where it is chunk by chunk.
+
+Its memory is the step of a demonstration that comes next. Where an episode starts it follows the
+demonstration that is nearest to what it sees, or one drawn by how near they are and by their
+weights; after every chunk it gets back into step, or changes to a demonstration that is nearer by
+far.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from policies.data.samples import Observation, RecurrentState, TrainedPolicy
+from policies.learners.chunks import Memory
+from policies.data.motions import seen_numbers
+
+
+class MotionPolicy(TrainedPolicy):
+    """Says where the joints go next; see `base.Policy`, with targets in the place of a choice."""
+
+    network: Memory
+
+    def predict(
+        self,
+        observation: Observation,
+        state: RecurrentState | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.float32], RecurrentState | None]:
+        """Return joint targets [rad; m for grippers], (J,) for one observation, (n, J) for n.
+
+        The memory after it, (n, 2), has the step that comes next and how many are left of the
+        chunk.
+        """
+        seen = seen_numbers(observation, self.spec)
+        single = seen.ndim == 1
+        seen = np.atleast_2d(seen)
+        fresh = np.ones(len(seen), dtype=np.bool_)
+        if state is not None:
+            fresh = np.zeros_like(fresh) if episode_start is None else np.asarray(episode_start)
+        memory = np.zeros((len(seen), 2)) if state is None else np.array(state[0])
+        rows = np.array(
+            [
+                self._row(numbers, bool(new), memory[n], deterministic)
+                for n, (numbers, new) in enumerate(zip(seen, fresh, strict=True))
+            ]
+        )
+        chunk = self.network.shape.chunk
+        left = np.where(fresh | (memory[:, 1] < 1), chunk, memory[:, 1]) - 1
+        stays = np.array([self.network.is_last(row) for row in rows])
+        targets = self.network.targets.numpy()[rows]
+        following = np.stack([np.where(stays, rows, rows + 1), left], axis=1).astype(np.float64)
+        return (targets[0] if single else targets), (following,)
+
+    def _row(
+        self,
+        seen: NDArray[np.float32],
+        fresh: bool,
+        memory: NDArray[np.float64],
+        deterministic: bool,
+    ) -> int:
+        """Return the step of a demonstration that is to be done now."""
+        if fresh:
+            rows, costs = self.network.entries(seen)
+            demo = costs.argmin() if deterministic else self._draw(-costs)
+            return int(rows[demo])
+        planned = int(memory[0])
+        return planned if memory[1] >= 1 else self.network.next_row(seen, planned)
+
+    def _draw(self, log_odds: NDArray[np.float64]) -> int:
+        edges = np.cumsum(softmax(log_odds))
+        return int(np.searchsorted(edges, self._random.random() * edges[-1], side="right"))

@@ -1,0 +1,113 @@
+"""The one place that talks to joblib: ordered parallel maps with a progress bar."""
+
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
+
+from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+from tqdm import tqdm
+
+from teasim.common.errors import ConfigError, WorkerError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+BACKENDS = ("loky", "dask", "ray")
+
+# One thread per worker: the workers are the parallelism. llvmpipe with 0 threads renders in the
+# calling thread, which is the best throughput when every core has its own process.
+WORKER_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "LP_NUM_THREADS": "0",
+}
+
+
+def default_jobs() -> int:
+    """Number of usable cores."""
+    return int(cpu_count())
+
+
+def run(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    jobs: int,
+    backend: str = "loky",
+    description: str = "",
+    progress: bool | None = None,
+) -> list[Result]:
+    """Map `function` over `items` in `jobs` processes and return the results in order.
+
+    With one job (or one item) it runs in this process, so a debugger can step in and nothing is
+    pickled. `progress` None means: a bar when stderr is a terminal.
+
+    Raises:
+        ConfigError: see `check_workers`, or the back end's package is not installed.
+        WorkerError: a process was killed from outside, most often for want of memory.
+    """
+    check_workers(jobs, backend)
+    show = sys.stderr.isatty() if progress is None else progress
+    bar = tqdm(total=len(items), desc=description, disable=not show, file=sys.stderr, leave=False)
+    with bar, warnings.catch_warnings():
+        # Workers whose memory has grown are renewed; their work goes on, so it is no concern.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
+        results = []
+        try:
+            for result in _results(function, items, jobs, backend):
+                results.append(result)
+                bar.update()
+        except TerminatedWorkerError as error:
+            raise WorkerError(
+                f"A worker process was killed after {len(results)} of {len(items)} {description}, "
+                "most often for want of memory; run the same command again with fewer --jobs."
+            ) from error
+    return results
+
+
+def check_workers(jobs: int, backend: str) -> None:
+    """Check how `run` is to work before anything is begun.
+
+    Raises:
+        ConfigError: `jobs` is not positive, or `backend` is unknown.
+    """
+    if jobs < 1:
+        raise ConfigError(f"jobs is {jobs}; choose 1 or more.")
+    if backend not in BACKENDS:
+        raise ConfigError(f"Unknown parallel backend '{backend}'; choose {', '.join(BACKENDS)}.")
+
+
+def _results(
+    function: Callable[[Item], Result], items: Sequence[Item], jobs: int, backend: str
+) -> Iterable[Result]:
+    if jobs == 1 or len(items) <= 1:
+        return (function(item) for item in items)
+    for name, value in WORKER_ENVIRONMENT.items():
+        os.environ.setdefault(name, value)
+    _register(backend)
+    with parallel_config(backend=backend, n_jobs=min(jobs, len(items))):
+        generator: Any = Parallel(return_as="generator", batch_size=1)(
+            delayed(function)(item) for item in items
+        )
+    results: Iterable[Result] = generator
+    return results
+
+
+def _register(backend: str) -> None:
+    """Make a joblib back end that lives in another package known to joblib."""
+    try:
+        if backend == "dask":
+            import distributed.joblib  # noqa: F401
+        elif backend == "ray":
+            from ray.util.joblib import register_ray
+
+            register_ray()
+    except ImportError as error:
+        raise ConfigError(
+            f"The parallel backend '{backend}' is not installed; "
+            f"run 'pip install teasim[{backend}]' or choose loky."
+        ) from error
