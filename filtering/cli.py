@@ -154,11 +154,12 @@ def run(arguments: FilterArguments) -> int:
     Raises:
         TeasimError: the pool is damaged, or an argument is out of range.
     """
-    from filtering.demo_filter import DemoFilter, FilterConfig, caution
-    from filtering.output import check_output, write_filter_output
-    from teasim.pool.sequences import SequencePool, open_source
+    from filtering.config import FilterConfig
+    from filtering.demo_filter import DemoFilter, caution
     from filtering.judging.norm.precedence import read_precedence
+    from filtering.output import check_output, write_filter_output
     from teasim.common import parallel
+    from teasim.pool.sequences import SequencePool, open_source
 
     if not 0.0 <= arguments.max_flagged <= 1.0:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
@@ -200,9 +201,9 @@ def run(arguments: FilterArguments) -> int:
 
 
 def _fit(arguments: FitArguments) -> int:
+    from filtering.segmentation.fitting import FitConfig, fit_segmenter
     from filtering.segmentation.mstcn_training import MSTCNConfig
     from filtering.segmentation.scoring import scores_table
-    from filtering.segmentation.fitting import FitConfig, fit_segmenter
     from teasim.common import parallel
 
     config = FitConfig(
@@ -236,8 +237,8 @@ def _fit(arguments: FitArguments) -> int:
 
 
 def _predict(arguments: PredictArguments) -> int:
-    from filtering.segmentation.scoring import scores_table
     from filtering.segmentation.fitting import predict
+    from filtering.segmentation.scoring import scores_table
     from teasim.common import parallel
 
     jobs = arguments.jobs or parallel.default_jobs()

@@ -17,10 +17,10 @@ from filtering.judging.explain import Clock
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
-from teasim.pool.sequences import SequencePool, Source
 from teasim.common.errors import ConfigError, TeasimError
-from teasim.pool import Pool
 from teasim.common.files import write_json, write_text
+from teasim.pool import Pool
+from teasim.pool.sequences import SequencePool, Source
 from teasim.pool.weight_table import write_weight_table
 
 FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")

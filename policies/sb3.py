@@ -29,8 +29,8 @@ from torch import Tensor
 
 from policies.data.samples import STATE_KEYS, ObservationSpec
 from policies.learners.networks import DecisionNetwork
-from policies.play.rollout import EnvironmentConfig, make_environment
 from policies.learners.subtask_policy import SubtaskPolicy
+from policies.play.rollout import EnvironmentConfig, make_environment
 from teasim.common.errors import ConfigError
 
 

@@ -8,15 +8,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from policies.data.samples import DecisionSamples
 from policies.checkpoint import save_policy
 from policies.data.demos import DemosConfig, load_decisions
 from policies.data.motions import MotionSamples, load_motions
-from policies.learners.registry import LEARNERS, LearnerKind, find_learner
+from policies.data.samples import DecisionSamples
 from policies.data.weighting import demo_weights, likely_experts
+from policies.learners.registry import LEARNERS, LearnerKind, find_learner
 from teasim.common.errors import ConfigError
-from teasim.pool import Pool
 from teasim.common.files import check_new_folder
+from teasim.pool import Pool
 
 
 @dataclass(frozen=True)

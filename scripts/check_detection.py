@@ -13,17 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.judging.baselines import BASELINES
-from filtering.demo_filter import FilterConfig
+from filtering.config import FilterConfig
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
-from filtering.vision.frame_features import FrameSource
-from filtering.segmentation.segmenter import segmenter_named
-from filtering.judging.verdict import Evidence, Verdict, by_norm
+from filtering.judging.baselines import BASELINES
 from filtering.judging.norm.steps import StepList
-from teasim.common.statistics import wilson_interval
+from filtering.judging.verdict import Evidence, Verdict, by_norm
+from filtering.segmentation.segmenter import segmenter_named
+from filtering.vision.frame_features import FrameSource
+from teasim.common.statistics import auroc, wilson_interval
 from teasim.pool import Pool, Span
-from teasim.pool.leakage import auroc
 from teasim.task.recipes import PRECEDENCE
 
 SIZES = (1, 2, 4, 6, 8)

@@ -16,8 +16,8 @@ from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.vision.frame_features import FrameSource
 from teasim.common.parallel import default_jobs
+from teasim.common.statistics import auroc
 from teasim.pool import Pool
-from teasim.pool.leakage import auroc
 
 INVISIBLE = "stir"
 """Sub-task whose effect nothing shows at rest; it is printed, but not counted."""

@@ -20,8 +20,7 @@ from sklearn.neighbors import NearestCentroid
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from filtering.vision.background import BACKGROUNDS
-from filtering.demo_filter import FilterConfig
+from filtering.config import FilterConfig
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import GeneratorConfig
 from filtering.features.erasure import rank_channels
@@ -30,10 +29,11 @@ from filtering.features.generator import FeatureGenerator
 from filtering.features.maps import segment_maps
 from filtering.features.pictures import overlay
 from filtering.features.reduction import reduce_features
-from filtering.vision.frames import segment_indices
 from filtering.judging.verdict import Evidence, by_equation_3
+from filtering.vision.background import BACKGROUNDS
+from filtering.vision.frames import segment_indices
+from teasim.common.statistics import auroc
 from teasim.pool import Episode, Pool
-from teasim.pool.leakage import auroc
 
 DRAWS = 30
 """Random sets of channels that are erased."""

@@ -9,9 +9,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from filtering.demo_filter import DemoFilter, FilterConfig
-from teasim.generate import GenerateConfig, generate
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from teasim.common.parallel import default_jobs
+from teasim.generate import GenerateConfig, generate
 from teasim.pool import Pool
 
 

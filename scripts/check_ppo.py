@@ -15,12 +15,12 @@ import numpy as np
 from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 
+from filtering.vision.determinism import one_thread
 from policies.checkpoint import load_policy
-from policies.learners.networks import one_thread
+from policies.learners.subtask_policy import SubtaskPolicy
 from policies.play.remembering import Remembering
 from policies.play.rollout import EnvironmentConfig, make_environment
 from policies.sb3 import as_ppo
-from policies.learners.subtask_policy import SubtaskPolicy
 
 SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "seed": 0}
 

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.vision.frame_features import FrameSource, frame_features
+from filtering.segmentation.fitting import labelled_videos, least_seconds
 from filtering.segmentation.metrics import SegmentationScores
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.mstcn_training import MSTCNConfig, MSTCNLearner
 from filtering.segmentation.scoring import score_episodes
 from filtering.segmentation.segments import Segmentation
-from filtering.segmentation.fitting import labelled_videos, least_seconds
+from filtering.vision.frame_features import FrameSource, frame_features
 from teasim.pool import Episode, Pool
 
 

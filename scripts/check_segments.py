@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from filtering.vision.frame_features import FrameSource, sampled_frames
-from filtering.vision.frames import main_camera
 from filtering.segmentation.clustering import RATE, looks, subtask_count
 from filtering.segmentation.discovery import Discovery, discover
+from filtering.vision.frame_features import FrameSource, sampled_frames
+from filtering.vision.frames import main_camera
 from teasim.pool import Pool
 from teasim.pool.types import index_from_spans
 

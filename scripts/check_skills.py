@@ -12,9 +12,9 @@ from functools import partial
 import numpy as np
 
 from teasim.common.errors import SkillError
+from teasim.common.parallel import default_jobs, run
 from teasim.generate.plan import DemoPlan
 from teasim.generate.recording import mismatch
-from teasim.common.parallel import default_jobs, run
 from teasim.rollout import demonstrate
 from teasim.task.mistakes import Plan, spoil
 from teasim.task.recipes import (

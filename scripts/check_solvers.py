@@ -13,13 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.annealed import Annealed
 from filtering.judging.equation3.exact import Exact
-from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.equation3.problem import Problem
 from filtering.judging.equation3.published import Published
 from filtering.judging.equation3.score import score
+from filtering.judging.equation3.sequence import transitions
+from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import StepList, count_steps
 
 RIDGE = 0.01

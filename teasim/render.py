@@ -8,8 +8,8 @@ from typing import Any, Self
 import mujoco
 import numpy as np
 
-from teasim.constants import CAMERAS, QUALITIES
 from teasim.common.errors import ConfigError, RenderError
+from teasim.constants import CAMERAS, QUALITIES
 from teasim.gl import choose_gl
 from teasim.world.dressing import apply_look
 from teasim.world.liquids import VESSELS, Stream

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teasim.constants import CONTROL_TIMESTEP
 from teasim.common.errors import ConfigError, SkillError
+from teasim.constants import CONTROL_TIMESTEP
 from teasim.skills.arm import Style
 from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform

@@ -12,8 +12,8 @@ from safetensors.numpy import save as save_arrays
 from filtering.effects.reader import Effect, EffectReader
 from filtering.vision.frame_features import FrameSource
 from filtering.vision.pretrained import describe_fitted, feature_recipe
-from teasim.common.errors import ConfigError
 from teasim.common.checkpoint import CheckpointKind
+from teasim.common.errors import ConfigError
 
 EFFECTS = CheckpointKind("effects", 1, held="effect reader", remedy="fit again")
 PER_EFFECT = ("errors", "accuracies", "certainties")

@@ -13,9 +13,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from filtering.vision.determinism import one_thread, seeded
 from filtering.features.config import BottleneckConfig
 from filtering.features.training import class_labels, predict_logits, train
+from filtering.vision.determinism import one_thread, seeded
 from teasim.common.errors import ConfigError
 
 SCALE_FLOOR = 0.05

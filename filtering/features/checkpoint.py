@@ -12,7 +12,6 @@ from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
-from filtering.vision.background import subtraction_named
 from filtering.features.bottleneck import Bottleneck, BottleneckNetwork
 from filtering.features.config import (
     BottleneckConfig,
@@ -22,9 +21,10 @@ from filtering.features.config import (
 )
 from filtering.features.generator import FeatureGenerator
 from filtering.features.learned import LearnedFeatures, LookConfig
+from filtering.vision.background import subtraction_named
 from filtering.vision.pretrained import describe_fitted, feature_recipe
-from teasim.common.errors import ConfigError
 from teasim.common.checkpoint import CheckpointKind
+from teasim.common.errors import ConfigError
 
 BOTTLENECK = CheckpointKind("bottleneck", 1, held="trained bottleneck", remedy="train again")
 GENERATOR = CheckpointKind("generator", 1, held="learned features", remedy="train again")

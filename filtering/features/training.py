@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
-from filtering.vision.determinism import one_thread
 from filtering.features.config import TrainingConfig
+from filtering.vision.determinism import one_thread
 from teasim.common.errors import ConfigError
 
 Forward = Callable[[Sequence[int]], Tensor]

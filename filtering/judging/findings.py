@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.judging.explain import Finding, gravest
-from filtering.judging.equation3.sequence import Transitions
-from filtering.judging.norm.norm_score import TRANSITION, NormScore
 from filtering.judging.equation3.score import Score
+from filtering.judging.equation3.sequence import Transitions
+from filtering.judging.explain import Finding, gravest
+from filtering.judging.norm.norm_score import TRANSITION, NormScore
 from teasim.pool import Span
 
 NOTABLE = 1.0

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from filtering.judging.kmeans import kmeans
-from teasim.common.errors import ConfigError, named
+from teasim.common.errors import ConfigError
+from teasim.common.registry import named
 
 GROUPS = ("auto", "1", "2", "3")
 """What may be asked for."""

@@ -13,16 +13,16 @@ from types import MappingProxyType
 import numpy as np
 
 from filtering.judging.clusters import decide
-from filtering.judging.findings import Findings, Places, find_departures, find_surprises
-from filtering.judging.equation3.sequence import transitions
-from filtering.judging.thresholds import Grouping, group_weights
-from filtering.judging.norm.norm_score import NormScore, score_steps
-from filtering.judging.norm.precedence import Pairs, precedence_graph
 from filtering.judging.equation3.problem import Problem
 from filtering.judging.equation3.score import score
+from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.solvers import solver_named
+from filtering.judging.findings import Findings, Places, find_departures, find_surprises
+from filtering.judging.norm.norm_score import NormScore, score_steps
+from filtering.judging.norm.precedence import Pairs, precedence_graph
 from filtering.judging.norm.steps import Array, StepCounts, StepList, count_steps
-from teasim.common.errors import named
+from filtering.judging.thresholds import Grouping, group_weights
+from teasim.common.registry import named
 from teasim.pool import Span
 
 IDLE_DOUBT = 1.0

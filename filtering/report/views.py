@@ -10,8 +10,8 @@ from filtering.demo_filter import DemoFilter
 from filtering.judging.explain import Clock, Finding, gravest
 from filtering.report.layout import Mark
 from filtering.report.page import DemoView, Segment
-from teasim.pool.sequences import SequencePool, Source
 from teasim.pool import VideoClip, read_frames
+from teasim.pool.sequences import SequencePool, Source
 from teasim.pool.videos import VideoWriter, video_content
 
 

@@ -15,19 +15,8 @@ from filtering.effects.reader import FEWEST_DEMOS, EffectReader, fit_effects
 from filtering.effects.rests import rest_features
 from filtering.features.checkpoint import save_features
 from filtering.features.learned import LookConfig, learn_features
-from filtering.vision.frame_features import (
-    FrameSource,
-    frame_features,
-    sampled_frames,
-)
-from filtering.vision.frames import chosen_cameras
 from filtering.segmentation.metrics import LabelPair, SegmentationScores, segmentation_scores
 from filtering.segmentation.mstcn_checkpoint import load_segmenter, save_segmenter
-from teasim.pool.mstcn import (
-    MSTCNFolder,
-    is_mstcn_folder,
-    write_predictions,
-)
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.mstcn_training import (
     LabelledVideo,
@@ -37,9 +26,20 @@ from filtering.segmentation.mstcn_training import (
 )
 from filtering.segmentation.scoring import UNSEEN, score_episodes, scores_json
 from filtering.segmentation.segments import decode
+from filtering.vision.frame_features import (
+    FrameSource,
+    frame_features,
+    sampled_frames,
+)
+from filtering.vision.frames import chosen_cameras
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool import Episode, Pool
 from teasim.common.files import check_new_folder, write_json
+from teasim.pool import Episode, Pool
+from teasim.pool.mstcn import (
+    MSTCNFolder,
+    is_mstcn_folder,
+    write_predictions,
+)
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
 USUAL_LABELLED = 12

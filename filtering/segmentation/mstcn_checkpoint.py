@@ -8,14 +8,14 @@ from typing import Any
 from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 
-from filtering.vision.determinism import seeded
-from filtering.vision.frame_features import FrameSource
-from filtering.vision.pretrained import describe_fitted, feature_recipe
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape
 from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
 from filtering.segmentation.scaling import SCALINGS
-from teasim.common.errors import ConfigError
+from filtering.vision.determinism import seeded
+from filtering.vision.frame_features import FrameSource
+from filtering.vision.pretrained import describe_fitted, feature_recipe
 from teasim.common.checkpoint import CheckpointKind
+from teasim.common.errors import ConfigError
 
 SEGMENTER = CheckpointKind("segmenter", 2, held="segmenter", remedy="fit again")
 

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.torch import save as save_tensors
 
+from filtering.segmentation.mstcn import MSTCN
+from filtering.segmentation.mstcn_training import frame_posteriors
+from filtering.segmentation.segments import Segmentation, decode, spans_of
 from filtering.vision.frame_features import (
     FrameSource,
     frame_features,
     moment_of_frames,
 )
-from filtering.segmentation.mstcn import MSTCN
-from filtering.segmentation.mstcn_training import frame_posteriors
-from filtering.segmentation.segments import Segmentation, decode, spans_of
 from teasim.common.errors import ConfigError
 from teasim.pool import Episode, Pool, Span
 

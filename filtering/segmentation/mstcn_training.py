@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 from tqdm import tqdm
 
-from filtering.vision.determinism import one_thread, seeded
 from filtering.segmentation.mstcn import MSTCN, MSTCNShape, mstcn_loss
 from filtering.segmentation.scaling import SCALINGS, mean_and_scale, scaled
+from filtering.vision.determinism import one_thread, seeded
 from teasim.common.errors import ConfigError
 from teasim.pool.types import runs
 

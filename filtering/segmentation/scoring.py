@@ -14,7 +14,9 @@ from filtering.segmentation.metrics import (
     segmentation_scores,
 )
 from filtering.segmentation.segments import Segmentation
+from teasim.common.errors import PoolError
 from teasim.pool import Episode
+from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder
 from teasim.pool.types import index_from_spans
 
 UNSEEN = "unseen"
@@ -72,3 +74,20 @@ def _pair(episode: Episode, number: int, found: Segmentation) -> LabelPair | Non
         index_from_spans(spans, names, episode.length) for spans in (logged, found.spans[number])
     )
     return LabelPair(np.asarray(truth), np.asarray(predicted))
+
+
+def folder_pair(folder: MSTCNFolder, video: str) -> LabelPair:
+    """Return the truth and the stored predictions of a video of an MS-TCN folder.
+
+    Raises:
+        PoolError: one of them is missing or damaged, or they differ in length.
+    """
+    truth, predicted = folder.truth(video), folder.predictions(video)
+    if truth is None:
+        raise PoolError(f"The video '{video}' of '{folder.root}' has no {TRUTH}.")
+    if len(truth) != len(predicted):
+        raise PoolError(
+            f"{TRUTH}/{video}.txt of '{folder.root}' has {len(truth)} labels "
+            f"but {PREDICTIONS}/{video}.txt has {len(predicted)}."
+        )
+    return LabelPair(truth, predicted)

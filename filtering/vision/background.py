@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from filtering.vision.frames import Frames
-from teasim.common.errors import named
+from teasim.common.registry import named
 
 GREY = 127
 """Value of a background pixel; the backbone's input is (x - 127) / 128."""

@@ -5,8 +5,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.checkpoint import CheckpointKind
+from teasim.common.errors import CheckpointError, ConfigError
 
 RECIPE = "efficientnet-lite0 b10 b15 avg max fp32, v1"
 """What is computed from a frame; changes whenever that changes, and with it every cache key."""

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.data.augmentation import views
-from policies.data.samples import DecisionSamples, ObservationSpec
 from policies.data.features import NO_MAPS, Maps, camera_maps
+from policies.data.samples import DecisionSamples, ObservationSpec
 from teasim.common import parallel
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Episode, Pool, read_frames

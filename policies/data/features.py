@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 from filtering.vision.backbone import BATCH, feature_maps
-from policies.learners.networks import one_thread
+from filtering.vision.determinism import one_thread
 
 Maps = NDArray[np.float16]
 """Feature maps (..., K, C, h, w) of K cameras; half precision, because a pool has many."""

@@ -18,20 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.demo_filter import DemoFilter
-from policies.data.samples import DecisionSamples
 from policies.data.demos import DemosConfig, load_decisions
-from policies.play.evaluation import MODES, Scores, World, play, score, worlds
+from policies.data.samples import DecisionSamples
+from policies.data.weighting import demo_weights
 from policies.experiments.ablation_config import LABELS, AblationConfig, FilterVariant
 from policies.learners.registry import find_learner
+from policies.play.evaluation import MODES, Scores, World, play, score, worlds
 from policies.play.results import as_json
 from policies.play.rollout import Action, EnvironmentConfig, Episode
-from teasim.common.statistics import bootstrap_difference
 from policies.training import places_of
-from policies.data.weighting import demo_weights
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
-from teasim.pool import Pool
 from teasim.common.files import check_new_folder, write_json, write_text
+from teasim.common.statistics import bootstrap_difference
+from teasim.pool import Pool
 from teasim.pool.weight_table import write_weight_table
 
 RECORD = "ablation.json"

@@ -25,12 +25,12 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
 
-from filtering.demo_filter import FilterConfig
+from filtering.config import FilterConfig
 from policies.data.demos import DemosConfig
-from policies.play.evaluation import EvaluationConfig
-from policies.learners.registry import find_learner
-from policies.play.rollout import EnvironmentConfig
 from policies.data.weighting import USES
+from policies.learners.registry import find_learner
+from policies.play.evaluation import EvaluationConfig
+from policies.play.rollout import EnvironmentConfig
 from teasim.common.errors import ConfigError
 
 LABELS = "labels"

@@ -15,25 +15,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.demo_filter import FEWEST_DEMOS, DemoFilter, FilterConfig
+from filtering.config import FilterConfig
+from filtering.demo_filter import FEWEST_DEMOS, DemoFilter
 from filtering.output import write_filter_output
 from filtering.report import ReportSection, render_report
 from filtering.report.views import demo_views
-from policies.data.samples import DecisionSamples
-from policies.learners.bc_rnn import BCRNN, BCRNNConfig
 from policies.checkpoint import save_policy
 from policies.data.demos import DemosConfig, load_decisions
-from policies.play.evaluation import EvaluationConfig, Scores, evaluate_all
+from policies.data.samples import DecisionSamples
+from policies.data.weighting import demo_weights
 from policies.experiments.score_section import score_section, sentences
+from policies.learners.bc_rnn import BCRNN, BCRNNConfig
+from policies.learners.subtask_policy import SubtaskPolicy
+from policies.play.evaluation import EvaluationConfig, Scores, evaluate_all
 from policies.play.results import as_json
 from policies.play.results import summary as rates
 from policies.play.rollout import EnvironmentConfig
-from policies.learners.subtask_policy import SubtaskPolicy
-from policies.data.weighting import demo_weights
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
-from teasim.pool import Pool
 from teasim.common.files import check_new_folder, write_json
+from teasim.pool import Pool
 from teasim.pool.weight_table import read_weight_table
 
 ALL = "all demonstrations"

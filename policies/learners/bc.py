@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
+from filtering.vision.determinism import one_thread
 from policies.data.samples import DecisionSamples
-from policies.learners.networks import DecisionNetwork, NetworkShape, one_thread
-from policies.learners.subtask_policy import SubtaskPolicy
 from policies.data.weighting import weigh, weighted_loss, weighted_moments
+from policies.learners.networks import DecisionNetwork, NetworkShape
+from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
 
 STEPS_WITH_PICTURES = 120

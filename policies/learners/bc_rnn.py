@@ -14,10 +14,10 @@ import torch
 from numpy.typing import NDArray
 
 from policies.data.samples import DecisionSamples
+from policies.data.weighting import weigh, weighted_moments
 from policies.learners.bc import BCConfig, clone, shape_for
 from policies.learners.networks import RecurrentNetwork
 from policies.learners.subtask_policy import SubtaskPolicy
-from policies.data.weighting import weigh, weighted_moments
 from teasim.common.errors import ConfigError
 
 

@@ -13,11 +13,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from filtering.vision.determinism import one_thread
 from policies.data.samples import DecisionSamples
-from policies.learners.bc import BCConfig, clone, shape_for
-from policies.learners.networks import Ensemble, one_thread
-from policies.learners.subtask_policy import SubtaskPolicy
 from policies.data.weighting import weigh, weighted_moments
+from policies.learners.bc import BCConfig, clone, shape_for
+from policies.learners.networks import Ensemble
+from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
 
 

@@ -28,11 +28,12 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import logsigmoid
 
+from filtering.vision.determinism import one_thread
 from policies.data.samples import DecisionSamples
-from policies.learners.bc import BCConfig, clone, shape_for
-from policies.learners.networks import DecisionNetwork, Encoder, one_thread
-from policies.learners.subtask_policy import SubtaskPolicy
 from policies.data.weighting import weigh, weighted_loss, weighted_moments
+from policies.learners.bc import BCConfig, clone, shape_for
+from policies.learners.networks import DecisionNetwork, Encoder
+from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
 
 

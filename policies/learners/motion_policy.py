@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
+from policies.data.motions import seen_numbers
 from policies.data.samples import Observation, RecurrentState, TrainedPolicy
 from policies.learners.chunks import Memory
-from policies.data.motions import seen_numbers
 
 
 class MotionPolicy(TrainedPolicy):

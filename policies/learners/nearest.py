@@ -15,10 +15,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.learners.chunks import Memory, MemoryShape
 from policies.data.motions import MotionSamples
-from policies.learners.motion_policy import MotionPolicy
 from policies.data.weighting import weigh
+from policies.learners.chunks import Memory, MemoryShape
+from policies.learners.motion_policy import MotionPolicy
 from teasim.common.errors import ConfigError
 
 PROBED = 10

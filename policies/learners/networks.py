@@ -6,8 +6,7 @@ the picture, as in the paper's section 3.2, and one linear layer chooses.
 """
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -25,17 +24,6 @@ differ, and things stand a few centimetres elsewhere in every scene, which means
 Memory = tuple[Tensor, ...]
 """What a network carries from one decision of an episode to the next, (n, H) each; () if nothing.
 """
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Run torch on one thread inside: sums get one order, and workers do not fight for cores."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize
 from scipy.special import expit, log_softmax
 
+from filtering.vision.determinism import one_thread
 from policies.data.samples import DecisionSamples
-from policies.learners.bc import shape_for
-from policies.learners.networks import DecisionNetwork, one_thread
-from policies.learners.subtask_policy import SubtaskPolicy
 from policies.data.weighting import weigh, weighted_moments
+from policies.learners.bc import shape_for
+from policies.learners.networks import DecisionNetwork
+from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
 
 REACH = 50.0

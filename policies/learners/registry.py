@@ -13,7 +13,8 @@ from policies.learners.bcnd import BCND, BCNDConfig
 from policies.learners.demodice import DemoDICE, DemoDICEConfig
 from policies.learners.nearest import Nearest, NearestConfig
 from policies.learners.r_maxent import RMaxEnt, RMaxEntConfig
-from teasim.common.errors import ConfigError, named
+from teasim.common.errors import ConfigError
+from teasim.common.registry import named
 
 
 class Learner(Protocol):

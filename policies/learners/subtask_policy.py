@@ -4,6 +4,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from filtering.vision.determinism import one_thread
+from policies.data.features import NO_MAPS, Maps, camera_maps
 from policies.data.samples import (
     STATE_KEYS,
     Observation,
@@ -12,8 +14,7 @@ from policies.data.samples import (
     TrainedPolicy,
     pictures,
 )
-from policies.data.features import NO_MAPS, Maps, camera_maps
-from policies.learners.networks import SubtaskNetwork, one_thread
+from policies.learners.networks import SubtaskNetwork
 
 
 class SubtaskPolicy(TrainedPolicy):

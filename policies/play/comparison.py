@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from policies.play.evaluation import Scores
-from teasim.common.statistics import Difference, bootstrap_difference, mcnemar
 from teasim.common.errors import ConfigError
+from teasim.common.statistics import Difference, bootstrap_difference, mcnemar
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from typing import Any
 
 import gymnasium as gym
 
+from filtering.vision.determinism import one_thread
 from policies.data.samples import ObservationSpec, Policy
-from policies.learners.networks import one_thread
 from policies.play.outcomes import Outcomes, tally
 from policies.play.remembering import Remembering, can_remember
 from policies.play.rollout import EnvironmentConfig, Episode, make_environment, run_episode
-from teasim.common.statistics import Rate, grouped_rate
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
+from teasim.common.statistics import Rate, grouped_rate
 
 MODES = ("deterministic", "sampled")
 

@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 
-from policies.play.evaluation import MODES, EvaluationConfig, batches
+from filtering.vision.determinism import one_thread
 from policies.learners.motion_policy import MotionPolicy
+from policies.play.evaluation import MODES, EvaluationConfig, batches
 from policies.play.joint_rollout import MotionEpisode, run_motion
-from policies.learners.networks import one_thread
 from policies.play.outcomes import Outcomes, tally
 from policies.play.rollout import EnvironmentConfig, make_environment
-from teasim.common.statistics import Rate, grouped_rate
 from teasim.common import parallel
+from teasim.common.statistics import Rate, grouped_rate
 
 
 @dataclass(frozen=True)

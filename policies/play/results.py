@@ -9,9 +9,9 @@ from typing import Any
 from policies.play.evaluation import Scores
 from policies.play.outcomes import Outcomes
 from policies.play.rollout import Episode
-from teasim.common.statistics import Rate
 from teasim.common.errors import ConfigError
 from teasim.common.files import write_bytes, write_json
+from teasim.common.statistics import Rate
 
 
 @dataclass(frozen=True)

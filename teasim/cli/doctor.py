@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from teasim.gl import BACKENDS, FIXES, Probe, probe
 from teasim.common.parallel import default_jobs
+from teasim.gl import BACKENDS, FIXES, Probe, probe
 
 PACKAGES = (
     "teasim",

@@ -1,10 +1,5 @@
 """Every error a user can cause: one sentence that names the culprit and the choices."""
 
-from collections.abc import Mapping
-from typing import TypeVar
-
-Registered = TypeVar("Registered")
-
 
 class TeasimError(Exception):
     """Base of all errors the command line turns into one sentence and exit code 2."""
@@ -36,14 +31,3 @@ class CheckpointError(TeasimError):
 
 class WorkerError(TeasimError):
     """A worker process was killed from outside before its work was done."""
-
-
-def named(what: str, registry: Mapping[str, Registered], name: str) -> Registered:
-    """Return what a registry has under a name; `what` says of which kind it is.
-
-    Raises:
-        ConfigError: it has nothing under that name.
-    """
-    if name not in registry:
-        raise ConfigError(f"Unknown {what} '{name}'; choose {', '.join(registry)}.")
-    return registry[name]

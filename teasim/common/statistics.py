@@ -138,3 +138,16 @@ def mcnemar(only_first: int, only_second: int) -> float:
     n, fewer = only_first + only_second, min(only_first, only_second)
     tail = sum(math.comb(n, k) for k in range(fewer + 1)) / 2**n
     return min(1.0, 2 * tail)
+
+
+def auroc(values: Sequence[float] | np.ndarray, positive: Sequence[bool] | np.ndarray) -> float:
+    """Share of pairs in which a positive has the larger value (n,); ties count half.
+
+    Raises:
+        ValueError: there are no positives or no negatives.
+    """
+    numbers, marks = np.asarray(values, dtype=float), np.asarray(positive, dtype=bool)
+    if marks.all() or not marks.any():
+        raise ValueError("An AUROC needs positives and negatives.")
+    differences = numbers[marks][:, None] - numbers[~marks][None, :]
+    return float((np.sign(differences).mean() + 1) / 2)

@@ -7,6 +7,8 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
+from teasim.common.errors import ConfigError
+from teasim.common.registry import named
 from teasim.constants import (
     ARM_JOINTS,
     ARMS,
@@ -15,7 +17,6 @@ from teasim.constants import (
     GRIPPER_SQUEEZE,
     STATE_NAMES,
 )
-from teasim.common.errors import ConfigError, named
 from teasim.world.yumi import JOINT_SPEEDS
 
 DELTA_SHARE = 0.85

@@ -8,9 +8,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from teasim.common.errors import ConfigError
 from teasim.constants import FPS, SUBTASKS
 from teasim.envs.observations import observation_space, observe
-from teasim.common.errors import ConfigError
 from teasim.render import StationRenderer, check_cameras, check_look
 from teasim.task.recipes import allowed_next, next_correct
 from teasim.task.scoring import Verdict, judge

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from teasim.constants import STATE_NAMES
 from teasim.common.errors import ConfigError
+from teasim.constants import STATE_NAMES
 from teasim.render import StationRenderer
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 

@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass, fields
 from numbers import Real
 from typing import Any
 
+from teasim.common.errors import ConfigError
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
 from teasim.envs.registration import MAX_SECONDS
-from teasim.common.errors import ConfigError
 from teasim.task.scoring import Verdict
 from teasim.world.collisions import CollisionCounter
 from teasim.world.simulation import Simulation

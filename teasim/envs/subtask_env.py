@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from teasim.common.errors import ConfigError, SkillError
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
 from teasim.envs.base import StationEnv
-from teasim.common.errors import ConfigError, SkillError
 from teasim.rollout import run_subtask
 from teasim.skills.arm import Style
 

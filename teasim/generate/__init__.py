@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from teasim.common.parallel import check_workers, run
 from teasim.generate.config import GenerateConfig
 from teasim.generate.plan import DemoPlan, plan_pool
 from teasim.generate.recording import demo_rng, generate_demo, pool_header
 from teasim.gl import choose_gl
-from teasim.common.parallel import check_workers, run
 from teasim.pool import Pool, claim_folder, episode_is_done, finalize_pool
 
 __all__ = ["DemoPlan", "GenerateConfig", "Generated", "demo_rng", "generate", "plan_pool"]

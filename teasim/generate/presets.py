@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from teasim.common.errors import named
+from teasim.common.registry import named
 from teasim.generate.config import GenerateConfig
 
 PRESETS: Mapping[str, Mapping[str, GenerateConfig]] = MappingProxyType(

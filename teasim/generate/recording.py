@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from teasim.constants import FPS, STATE_NAMES, SUBTASKS
 from teasim.common.errors import GenerationError, SkillError
+from teasim.constants import FPS, STATE_NAMES, SUBTASKS
 from teasim.generate.config import GenerateConfig
 from teasim.generate.plan import DemoPlan
 from teasim.pool import EpisodeRecord, EpisodeWriter, MistakeSpan, PoolHeader, Span

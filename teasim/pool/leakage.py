@@ -6,30 +6,18 @@ the incorrect ones always have more of it, 0.0 that they always have less. It re
 the pool and is for whoever makes pools, never for a filter.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
 
 from teasim.common.errors import PoolError
+from teasim.common.statistics import auroc
 from teasim.pool.lerobot import Episode, Pool
 from teasim.pool.videos import read_frames
 
 MOTION_STEP = 5
 """Motion is measured between frames this far apart."""
-
-
-def auroc(values: Sequence[float] | np.ndarray, positive: Sequence[bool] | np.ndarray) -> float:
-    """Share of pairs in which a positive has the larger value (n,); ties count half.
-
-    Raises:
-        ValueError: there are no positives or no negatives.
-    """
-    numbers, marks = np.asarray(values, dtype=float), np.asarray(positive, dtype=bool)
-    if marks.all() or not marks.any():
-        raise ValueError("An AUROC needs positives and negatives.")
-    differences = numbers[marks][:, None] - numbers[~marks][None, :]
-    return float((np.sign(differences).mean() + 1) / 2)
 
 
 def leakage(pool: Pool) -> dict[str, float]:

@@ -18,7 +18,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.segmentation.metrics import LabelPair
 from teasim.common.errors import PoolError
 from teasim.common.files import write_atomically, write_text
 from teasim.pool.types import NO_SUBTASK
@@ -135,22 +134,6 @@ class MSTCNFolder:
             if video not in self.videos:
                 raise PoolError(f"'{path}' names the video '{video}', which is not in the folder.")
         return videos
-
-    def pair(self, video: str) -> LabelPair:
-        """Return the truth and the stored predictions of a video.
-
-        Raises:
-            PoolError: one of them is missing or damaged, or they differ in length.
-        """
-        truth, predicted = self.truth(video), self.predictions(video)
-        if truth is None:
-            raise PoolError(f"The video '{video}' of '{self.root}' has no {TRUTH}.")
-        if len(truth) != len(predicted):
-            raise PoolError(
-                f"{TRUTH}/{video}.txt of '{self.root}' has {len(truth)} labels "
-                f"but {PREDICTIONS}/{video}.txt has {len(predicted)}."
-            )
-        return LabelPair(truth, predicted)
 
     def _labels(self, path: Path) -> NDArray[np.int64]:
         lines = _read_lines(path)

@@ -12,10 +12,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder, is_mstcn_folder
 from filtering.segmentation.segments import Segmentation
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool, Span
+from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder, is_mstcn_folder
 from teasim.pool.types import spans_from_index
 
 LABELS = ("truth", "predictions")

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from mink import SE3
 
-from teasim.constants import ARMS, CONTROL_TIMESTEP, GRIPPER_SQUEEZE
 from teasim.common.errors import SkillError
+from teasim.constants import ARMS, CONTROL_TIMESTEP, GRIPPER_SQUEEZE
 from teasim.skills.geometry import (
     EASE_PEAK,
     between,

@@ -6,8 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from teasim.constants import ARMS
 from teasim.common.errors import ConfigError
+from teasim.constants import ARMS
 from teasim.skills.arm import Style
 from teasim.task.recipes import SEQ_1, is_legal
 from teasim.world.embodiments import EMBODIMENTS

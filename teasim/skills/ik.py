@@ -8,8 +8,8 @@ from typing import Protocol
 import mink
 import numpy as np
 
-from teasim.constants import ARM_JOINTS
 from teasim.common.errors import SkillError
+from teasim.constants import ARM_JOINTS
 from teasim.skills.geometry import position
 from teasim.skills.hand_ik import HandKinematics
 from teasim.world.yumi import READY, planning_model

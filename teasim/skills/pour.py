@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 from mink import SE3
 
-from teasim.constants import CONTROL_TIMESTEP
 from teasim.common.errors import SkillError
+from teasim.constants import CONTROL_TIMESTEP
 from teasim.skills.arm import Arm, Curve, Motion
 from teasim.skills.geometry import DOWN, UP, about, between, pose, rotation, shifted, tool
 from teasim.task.mistakes import ABANDONED, INEFFECTIVE, Manner

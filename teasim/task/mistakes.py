@@ -11,7 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from teasim.common.errors import ConfigError, named
+from teasim.common.errors import ConfigError
+from teasim.common.registry import named
 from teasim.task.recipes import CRITICAL, POURED, PRECEDENCE, check_subtask, recognisable
 
 Manner = Literal["well", "ineffective", "abandoned"]

@@ -5,8 +5,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from teasim.constants import SUBTASKS
 from teasim.common.errors import ConfigError
+from teasim.constants import SUBTASKS
 
 SEQ_1 = (
     "turn_on_oven",

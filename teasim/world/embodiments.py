@@ -7,8 +7,8 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
+from teasim.common.registry import named
 from teasim.constants import ARM_JOINTS
-from teasim.common.errors import named
 from teasim.world.person import (
     HAND_JOINTS,
     HAND_RANGE,

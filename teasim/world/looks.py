@@ -9,8 +9,8 @@ from math import isfinite
 
 import numpy as np
 
-from teasim.constants import CAMERAS
 from teasim.common.errors import ConfigError
+from teasim.constants import CAMERAS
 
 Colour = tuple[float, float, float]
 """Red, green and blue, 0 to 1."""

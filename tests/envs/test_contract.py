@@ -9,8 +9,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
-from teasim.constants import CAMERAS, SUBTASKS
 from teasim.common.errors import ConfigError
+from teasim.constants import CAMERAS, SUBTASKS
 from tests.envs.fingerprint import fingerprint
 
 ROOT = Path(__file__).parents[2]

@@ -6,12 +6,12 @@ import gymnasium
 import numpy as np
 import pytest
 
+from teasim.common.errors import ConfigError
 from teasim.constants import STATE_NAMES
 from teasim.envs.actions import CONTROLS
 from teasim.envs.observations import OBS_TYPES
 from teasim.envs.registration import register_envs
 from teasim.envs.rewards import RewardWeights
-from teasim.common.errors import ConfigError
 
 VARIANTS = {control: ("TeaMaking", {"control": control}) for control in CONTROLS}
 VARIANTS["subtasks"] = ("TeaMakingSubtasks", {})

@@ -5,10 +5,10 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from teasim.common.errors import ConfigError
 from teasim.constants import ARM_JOINTS, SUBTASKS
 from teasim.envs.registration import MAX_SECONDS
 from teasim.envs.rewards import OVEN_SECONDS, RewardTerms, RewardWeights
-from teasim.common.errors import ConfigError
 from teasim.task.scoring import Verdict
 from teasim.world.events import Event
 from teasim.world.liquids import VESSELS

@@ -5,8 +5,8 @@ import pickle
 import numpy as np
 import pytest
 
-from teasim.constants import SUBTASKS
 from teasim.common.errors import ConfigError
+from teasim.constants import SUBTASKS
 from teasim.task.recipes import SEQ_1
 
 TURN_ON, ADD_WATER, _, _, ADD_TEA_BAG, STIR, TURN_OFF = range(7)

@@ -6,8 +6,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from teasim.envs.registration import register_envs
 from teasim.common.errors import RenderError
+from teasim.envs.registration import register_envs
 
 VIEW = {
     "obs_type": "pixels",

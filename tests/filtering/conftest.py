@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from filtering.demo_filter import DemoFilter, FilterConfig
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from teasim.pool import Pool
 from tests.toy_pool import SEQ_1, make_toy_pool
 

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.judging.thresholds import probability_incorrect
-from filtering.judging.verdict import JUDGES, Evidence, Rule
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import StepList, count_steps
+from filtering.judging.thresholds import probability_incorrect
+from filtering.judging.verdict import JUDGES, Evidence, Rule
 from teasim.pool import Span
 
 RULE = Rule("auto", "auto", "annealed", 0.5, 0.01, (), 0.0)

@@ -5,7 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.judging.baselines import BASELINES, bernoulli, bigram, edit_distance, length, segments
+from filtering.judging.baselines import (
+    BASELINES,
+    bernoulli,
+    bigram,
+    edit_distance,
+    length,
+    segments,
+)
 from filtering.judging.norm.steps import StepList
 
 STEP_LISTS = st.lists(st.tuples(st.integers(0, 4), st.integers(1, 9)), min_size=1, max_size=6).map(

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from filtering.demo_filter import DemoFilter, FilterConfig
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.segmentation import clustering as module
 from filtering.segmentation.clustering import AVERAGES, subtask_count
 from filtering.segmentation.segmenter import SEGMENTERS, segmenter_named

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from filtering.demo_filter import DemoFilter, FilterConfig
-from filtering.segmentation.segmenter import segmenter_named
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.judging.verdict import JUDGES
+from filtering.segmentation.segmenter import segmenter_named
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool
 from tests.filtering.conftest import TOY_SEQUENCES

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filtering.judging.clusters import SMALLEST_CUT
+from filtering.judging.equation3.score import Score
+from filtering.judging.equation3.sequence import transitions
 from filtering.judging.explain import Finding
 from filtering.judging.findings import Places, find_departures, find_surprises, usual_order
-from filtering.judging.equation3.sequence import transitions
-from filtering.judging.verdict import Evidence
 from filtering.judging.norm.norm_score import score_steps
-from filtering.judging.equation3.score import Score
+from filtering.judging.verdict import Evidence
 from teasim.pool import Span
 
 NAMES = ("a", "b", "c", "d")

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.demo_filter import FilterConfig
+from filtering.config import FilterConfig
 from filtering.judging.explain import Clock, explain
+from filtering.judging.norm.norm_score import score_steps
+from filtering.judging.verdict import IDLE_DOUBT, Evidence, Verdict, by_norm, in_vain
 from filtering.report.layout import Mark
 from filtering.report.views import marks_of
-from filtering.judging.verdict import IDLE_DOUBT, Evidence, Verdict, by_norm, in_vain
-from filtering.judging.norm.norm_score import score_steps
 from teasim.pool import Span
 
 NAMES = ("a", "b", "c", "d")

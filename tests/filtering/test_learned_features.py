@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from filtering.demo_filter import DemoFilter, FilterConfig
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.effects.checkpoint import load_effects
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.checkpoint import load_features
@@ -21,8 +22,8 @@ from filtering.features.extraction import segment_features
 from filtering.features.learned import LookConfig, learn_features
 from filtering.features.maps import frame_maps, segment_maps
 from filtering.features.pictures import overlay
-from filtering.segmentation.mstcn_training import MSTCNConfig
 from filtering.segmentation.fitting import FitConfig, fit_segmenter
+from filtering.segmentation.mstcn_training import MSTCNConfig
 from teasim.common.errors import CheckpointError, ConfigError
 from teasim.pool import Pool
 from tests.toy_pool import make_toy_pool

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import torch
 
+from filtering.features.extraction import segment_features
+from filtering.features.reduction import MAX_COMPONENTS, reduce_features
 from filtering.vision.backbone import FRAME_FEATURES, SameConv, describe_frames, load_backbone
 from filtering.vision.background import GREY, subtraction_named
 from filtering.vision.cache import ArrayCache
-from filtering.features.extraction import segment_features
-from filtering.features.reduction import MAX_COMPONENTS, reduce_features
 from filtering.vision.frames import fit_size, uniform_indices
 from teasim.common.errors import ConfigError
 from teasim.pool import Pool

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
+from filtering.segmentation.scoring import folder_pair
 from teasim.common.errors import PoolError
+from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
 from tests.filtering.conftest import real_data
 
 
@@ -50,7 +51,7 @@ def test_what_is_written_reads_back(tmp_path):
     opened = MSTCNFolder.open(tmp_path)
     assert opened.names == ("pour in", "stir")
     assert opened.predictions("b").tolist() == [1]
-    pair = opened.pair("a")
+    pair = folder_pair(opened, "a")
     assert (pair.truth.tolist(), pair.predicted.tolist()) == ([0, 1, 1], [0, 1, -1])
     read = opened.posteriors("a")
     assert read is not None
@@ -187,7 +188,7 @@ def test_splits_that_are_not_there(folder):
 def test_truth_and_predictions_of_different_length(folder):
     (folder / "predictions").mkdir()
     (folder / "predictions" / "one.txt").write_text("pour\n")
-    assert refusal(lambda: MSTCNFolder.open(folder).pair("one")) == (
+    assert refusal(lambda: folder_pair(MSTCNFolder.open(folder), "one")) == (
         f"groundTruth/one.txt of '{folder}' has 4 labels but predictions/one.txt has 1."
     )
 

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from filtering.judging.norm.mixture import find_populations
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import StepList, count_steps, steps_of_frames
-from teasim.pool.leakage import auroc
+from teasim.common.statistics import auroc
 
 T = 7
 USUAL = tuple(range(T))

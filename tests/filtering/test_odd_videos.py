@@ -7,9 +7,10 @@ import av
 import numpy as np
 import pytest
 
-from filtering.demo_filter import DemoFilter, FilterConfig
-from filtering.segmentation.mstcn_training import MSTCNConfig
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.segmentation.fitting import FitConfig, fit_segmenter
+from filtering.segmentation.mstcn_training import MSTCNConfig
 from teasim.pool import Pool
 from tests import toy_pool
 from tests.toy_pool import SEQ_1, make_toy_pool

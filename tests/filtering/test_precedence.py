@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.judging.clusters import cut_of
-from filtering.demo_filter import DemoFilter, FilterConfig
-from teasim.pool.mstcn import write_predictions
-from teasim.pool.sequences import SequencePool
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.precedence import precedence_graph, read_precedence
 from filtering.judging.norm.steps import StepList, count_steps
 from teasim.common.errors import ConfigError
+from teasim.pool.mstcn import write_predictions
+from teasim.pool.sequences import SequencePool
 from tests.toy_pool import SEQ_1
 
 USUAL, LEGAL, WRONG, SHORT = (

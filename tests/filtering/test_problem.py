@@ -3,8 +3,8 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from filtering.features.reduction import reduce_features
-from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.problem import Problem
+from filtering.judging.equation3.sequence import transitions
 from tests.filtering.simulator import pool_of
 
 

@@ -3,11 +3,11 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.features.reduction import reduce_features
-from filtering.judging.equation3.sequence import transitions
-from filtering.judging.thresholds import group_weights
 from filtering.judging.equation3.annealed import Annealed
 from filtering.judging.equation3.problem import Problem
 from filtering.judging.equation3.score import Score, graded, score, worst_first
+from filtering.judging.equation3.sequence import transitions
+from filtering.judging.thresholds import group_weights
 from tests.filtering.simulator import SEQ_1, SimulatedPool, pool_of, simulate
 
 

@@ -8,15 +8,16 @@ import pytest
 
 from filtering.cli import main as filter_verb
 from filtering.cli import segment
-from filtering.demo_filter import DemoFilter, FilterConfig
-from filtering.vision.frame_features import FrameSource, frame_features
-from filtering.segmentation.mstcn_checkpoint import load_segmenter
-from teasim.pool.mstcn import MSTCNFolder, write_predictions
-from filtering.segmentation.mstcn_training import MSTCNConfig
-from filtering.segmentation.scoring import score_episodes
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.segmentation.fitting import FitConfig, FitResult, fit_segmenter, predict
+from filtering.segmentation.mstcn_checkpoint import load_segmenter
+from filtering.segmentation.mstcn_training import MSTCNConfig
+from filtering.segmentation.scoring import folder_pair, score_episodes
+from filtering.vision.frame_features import FrameSource, frame_features
 from teasim.common.errors import ConfigError, PoolError, TeasimError
 from teasim.pool import Episode, Pool, Span
+from teasim.pool.mstcn import MSTCNFolder, write_predictions
 from tests.filtering.conftest import TOY_SEQUENCES
 from tests.toy_pool import SEQ_1, make_toy_pool
 
@@ -105,7 +106,7 @@ def test_the_verb_fits_and_predicts(toy_pool, tmp_path, capsys):
     assert f"predictions: {said / 'predictions'}" in capsys.readouterr().out
     written = MSTCNFolder.open(said)
     assert written.videos == tuple(f"episode_{n:06d}" for n in range(7))
-    pairs = [written.pair(video) for video in written.videos]
+    pairs = [folder_pair(written, video) for video in written.videos]
     assert [len(pair.truth) for pair in pairs] == [e.length for e in toy_pool.episodes]
     metrics = json.loads((said / "metrics.json").read_text())
     assert (metrics["labelled"]["videos"], metrics["unseen"]["videos"]) == (2, 5)
@@ -130,7 +131,7 @@ def test_predictions_from_stored_features(fitted, toy_pool: Pool, tmp_path):
     for number, posteriors in enumerate(found.posteriors[:6]):
         stored = np.load(tmp_path / "out" / "posteriors" / f"v{number}.npy", allow_pickle=False)
         np.testing.assert_array_equal(stored.T, posteriors)
-    assert written.pair("v0").truth.tolist() == [
+    assert folder_pair(written, "v0").truth.tolist() == [
         written.names.index(names[label]) for label in truth["v0"]
     ]
 

@@ -16,6 +16,7 @@ from filtering.segmentation.metrics import (
     segmentation_scores,
     subtask_accuracy,
 )
+from filtering.segmentation.scoring import folder_pair
 from teasim.pool.mstcn import MSTCNFolder
 from tests.filtering.conftest import real_data
 
@@ -174,7 +175,7 @@ def test_more_overlap_is_harder_and_more_tolerance_is_easier(labels):
 def test_predictions_of_others_on_50_salads_score_as_their_program_says():
     # Edit and F1 from the published evaluation program of MS-TCN on the same files.
     folder = MSTCNFolder.open(real_data("50salads"))
-    scores = segmentation_scores([folder.pair(video) for video in folder.videos])
+    scores = segmentation_scores([folder_pair(folder, video) for video in folder.videos])
     assert (scores.videos, len(folder.names)) == (50, 19)
     assert scores.accuracy == pytest.approx(82.878, abs=5e-4)
     assert scores.edit == pytest.approx(73.338, abs=5e-4)

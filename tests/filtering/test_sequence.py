@@ -3,7 +3,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtering.judging.equation3.sequence import Transitions, done_so_far, next_labels, state_rows, transitions
+from filtering.judging.equation3.sequence import (
+    Transitions,
+    done_so_far,
+    next_labels,
+    state_rows,
+    transitions,
+)
 
 N_SUBTASKS = 7
 labels_lists = st.lists(st.integers(0, N_SUBTASKS - 1), min_size=1, max_size=12)

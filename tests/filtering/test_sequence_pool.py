@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from filtering.cli import main
-from filtering.demo_filter import DemoFilter, FilterConfig
-from filtering.output import FILES
-from teasim.pool.mstcn import write_predictions
-from teasim.pool.sequences import SequencePool, joined_spans, open_source
-from filtering.judging.verdict import JUDGES
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import count_steps, steps_of_frames
+from filtering.judging.verdict import JUDGES
+from filtering.output import FILES
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool, Span
+from teasim.pool.mstcn import write_predictions
+from teasim.pool.sequences import SequencePool, joined_spans, open_source
 from teasim.pool.weight_table import read_weight_table
 from tests.filtering.conftest import real_data
 from tests.toy_pool import SEQ_1

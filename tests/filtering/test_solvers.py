@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from filtering.features.reduction import reduce_features
-from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.alternating import Alternating
 from filtering.judging.equation3.annealed import Annealed, trust
 from filtering.judging.equation3.exact import MOST, Exact
 from filtering.judging.equation3.problem import Problem
 from filtering.judging.equation3.published import Published
 from filtering.judging.equation3.score import leave_one_out
+from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.solver import Solver, concentrate, fill, kinds_of, thinned
 from filtering.judging.equation3.solvers import SOLVERS, solver_named
 from teasim.common.errors import ConfigError

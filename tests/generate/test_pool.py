@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import teasim.generate
-from teasim.constants import SUBTASKS
 from teasim.common.errors import GenerationError, PoolError, SkillError
+from teasim.constants import SUBTASKS
 from teasim.generate import DemoPlan, GenerateConfig, generate, plan_pool, recording
 from teasim.generate.recording import ATTEMPTS, generate_demo
 from teasim.pool import Pool

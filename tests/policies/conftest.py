@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from policies.data.samples import DecisionSamples, ObservationSpec
 from policies.data.demos import DemosConfig, load_decisions
 from policies.data.motions import MotionSamples
+from policies.data.samples import DecisionSamples, ObservationSpec
 from tests.policies.fake_joints import make_joint_pool
 from tests.policies.fakes import SEQ_1, make_fake_pool
 

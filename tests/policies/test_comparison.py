@@ -10,8 +10,8 @@ from scipy.stats import binomtest
 
 from policies.play.comparison import compare, comparison_json, comparison_text
 from policies.play.evaluation import EvaluationConfig, evaluate
-from teasim.common.statistics import bootstrap_difference, mcnemar
 from teasim.common.errors import ConfigError
+from teasim.common.statistics import bootstrap_difference, mcnemar
 from tests.policies.fakes import FAKE_WORLD, ScriptedPolicy
 
 STUCK = (0, 4, 4, 4, 4, 4, 4)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from policies.data.samples import ObservationSpec
 from policies.data.demos import DemosConfig, load_decisions
 from policies.data.features import camera_maps
-from teasim.constants import STATE_NAMES, SUBTASKS
+from policies.data.samples import ObservationSpec
 from teasim.common.errors import ConfigError, PoolError
+from teasim.constants import STATE_NAMES, SUBTASKS
 from teasim.pool import read_frames
 from tests.policies.fakes import FLAGS
 

@@ -7,9 +7,9 @@ from policies.data.samples import ObservationSpec
 from policies.play.captions import STRIP, caption
 from policies.play.evaluation import MODES, EvaluationConfig, evaluate, score
 from policies.play.rollout import EnvironmentConfig, Episode, make_environment, run_episode
+from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.statistics import rate
 from teasim.constants import STATE_NAMES
-from teasim.common.errors import CheckpointError, ConfigError
 from teasim.pool.videos import VideoClip, count_decodable, read_frames
 from tests.policies.fakes import FAKE_WORLD, FLAGS, SEQ_1, SUBTASKS, ScriptedPolicy
 

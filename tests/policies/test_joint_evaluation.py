@@ -5,17 +5,17 @@ import json
 import numpy as np
 import pytest
 
-from policies.data.samples import ObservationSpec
 from policies.checkpoint import load_policy
 from policies.cli import evaluate, train
+from policies.data.samples import ObservationSpec
 from policies.play.evaluation import EvaluationConfig
 from policies.play.joint_evaluation import evaluate_motion, score_motion
 from policies.play.joint_results import mean_done, motion_summary
 from policies.play.joint_rollout import JOINT_ENVIRONMENT, PATIENCE, MotionEpisode, run_motion
 from policies.play.rollout import make_environment
+from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.statistics import rate
 from teasim.constants import SUBTASKS
-from teasim.common.errors import CheckpointError, ConfigError
 from tests.policies.fake_joints import FAKE_JOINTS, FAKE_JOINTS_ID
 from tests.policies.fakes import SEQ_1
 

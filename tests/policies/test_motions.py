@@ -6,8 +6,8 @@ import pytest
 from policies.cli import train
 from policies.data.motions import load_motions, one_sign, seen_numbers
 from teasim.cli.main import main
-from teasim.constants import STATE_NAMES
 from teasim.common.errors import ConfigError
+from teasim.constants import STATE_NAMES
 from tests.policies.fakes import FLAGS
 
 

@@ -6,7 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from policies.learners.r_maxent import RMaxEntConfig, Rows, demo_losses, fit_multipliers, solve, trust
+from policies.learners.r_maxent import (
+    RMaxEntConfig,
+    Rows,
+    demo_losses,
+    fit_multipliers,
+    solve,
+    trust,
+)
 from tests.policies.learning import make
 
 STATES = 5

@@ -7,11 +7,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from policies.data.samples import ObservationSpec
 from policies.data.demos import DemosConfig, load_decisions
+from policies.data.samples import ObservationSpec
 from policies.sb3 import as_ppo, sb3_environment
-from teasim.constants import STATE_NAMES
 from teasim.common.errors import ConfigError
+from teasim.constants import STATE_NAMES
 from tests.policies.fakes import FAKE_WORLD, FLAGS, SIZE
 from tests.policies.learning import AT_SUBTASKS, make
 

@@ -2,8 +2,8 @@
 
 import xml.etree.ElementTree as ElementTree
 
-from policies.play.evaluation import score
 from policies.experiments.score_section import score_section, sentences
+from policies.play.evaluation import score
 from policies.play.rollout import Action, Episode
 
 

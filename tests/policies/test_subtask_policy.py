@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from policies.data.samples import ObservationSpec
 from policies.data.features import camera_maps
+from policies.data.samples import ObservationSpec
 from policies.learners.networks import DecisionNetwork, NetworkShape
 from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.constants import STATE_NAMES, SUBTASKS

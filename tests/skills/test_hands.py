@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.constants import ARMS
 from teasim.common.errors import SkillError
+from teasim.constants import ARMS
 from teasim.rollout import run_subtask
 from teasim.skills.arm import Style
 from teasim.skills.geometry import DOWN, pose, position, rotation, tool, turn_angle

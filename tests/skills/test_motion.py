@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.constants import ARMS, CONTROL_TIMESTEP
 from teasim.common.errors import SkillError
+from teasim.constants import ARMS, CONTROL_TIMESTEP
 from teasim.skills.arm import SPEED_MARGIN, Arm, Style
 from teasim.skills.geometry import (
     DOWN,

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from teasim.constants import ARMS, SUBTASKS
 from teasim.common.errors import ConfigError, SkillError
+from teasim.constants import ARMS, SUBTASKS
 from teasim.rollout import run_subtask
 from teasim.skills.arm import Style
 from teasim.skills.demonstrators import sample_style, varied

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.constants import SUBTASKS
 from teasim.common.errors import ConfigError
+from teasim.constants import SUBTASKS
 from teasim.task.mistakes import MISSING_THE_CUP, MISTAKES, Plan, mistake, skip, spoil
 from teasim.task.recipes import (
     CRITICAL,

@@ -4,8 +4,8 @@ from itertools import permutations
 
 import pytest
 
-from teasim.constants import SUBTASKS
 from teasim.common.errors import ConfigError
+from teasim.constants import SUBTASKS
 from teasim.task.recipes import (
     CRITICAL,
     PRECEDENCE,

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teasim.constants import CAMERAS, SUBTASKS
 from teasim.common.errors import ConfigError
+from teasim.constants import CAMERAS, SUBTASKS
 from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
 from teasim.task.mistakes import Plan

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.constants import ARMS
 from teasim.common.errors import ConfigError
+from teasim.constants import ARMS
 from teasim.world.embodiments import EMBODIMENTS, PERSON, find_embodiment
 from teasim.world.monitor import roles
 from teasim.world.person import (

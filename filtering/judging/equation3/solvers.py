@@ -8,7 +8,7 @@ from filtering.judging.equation3.annealed import Annealed
 from filtering.judging.equation3.exact import Exact
 from filtering.judging.equation3.published import Published
 from filtering.judging.equation3.solver import Solver
-from teasim.common.errors import named
+from teasim.common.registry import named
 
 SOLVERS: Mapping[str, type[Solver]] = MappingProxyType(
     {"annealed": Annealed, "alternating": Alternating, "exact": Exact, "published": Published}
