@@ -4,11 +4,15 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from teasim.common.errors import ConfigError, TeasimError
+
+if TYPE_CHECKING:
+    from filtering.demo_filter import DemoFilter
+    from teasim.pool.source import Source
 
 
 @dataclass(frozen=True)
@@ -20,8 +24,8 @@ class FilterArguments:
     frame in groundTruth/*.txt or predictions/*.txt, mapping.txt) without videos."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
-    segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool), clustering (the videos
+    segmenter: str = "logged"
+    """Where segments come from: logged (the sub-tasks logged in the pool), clustering (the videos
     alone, without labels), predictions (those stored in an MS-TCN folder), or the folder of a
     segmenter that `teasim segment fit` made."""
     subtasks: str = "auto"
@@ -155,11 +159,12 @@ def run(arguments: FilterArguments) -> int:
         TeasimError: the pool is damaged, or an argument is out of range.
     """
     from filtering.config import FilterConfig
-    from filtering.demo_filter import DemoFilter, caution
+    from filtering.demo_filter import DemoFilter
     from filtering.judging.norm.precedence import read_precedence
     from filtering.output import check_output, write_filter_output
     from teasim.common import parallel
-    from teasim.pool.sequences import SequencePool, open_source
+    from teasim.pool.readers.reader import ReadOptions
+    from teasim.pool.readers.registry import open_source
 
     if not 0.0 <= arguments.max_flagged <= 1.0:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
@@ -178,26 +183,31 @@ def run(arguments: FilterArguments) -> int:
         features=arguments.features,
         effects=arguments.effects,
     )
-    pool = open_source(arguments.source, arguments.fps)
+    pool = open_source(arguments.source, ReadOptions(fps=arguments.fps))
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)
     jobs = arguments.jobs or parallel.default_jobs()
     fitted = DemoFilter(config).fit(pool, jobs=jobs)
     write_filter_output(arguments.out, pool, fitted, overwrite=arguments.overwrite)
+    _print_result(pool, fitted, arguments.out)
+    return 1 if float(fitted.flagged_.mean()) > arguments.max_flagged else 0
+
+
+def _print_result(pool: "Source", fitted: "DemoFilter", out: Path) -> None:
+    from filtering.demo_filter import caution
+
     confidence = fitted.segments_.confidence()
     if confidence is not None:
         found = len(fitted.segments_.subtasks)
         print(f"{found} sub-tasks, recognised with a mean probability of {confidence:.2f}.")
+    names = {demo.demo_id: demo.name for demo in pool.episodes}
     for row in fitted.table():
         if row.flagged:
-            name = row.demo_id if isinstance(pool, SequencePool) else f"video {row.episode_index}"
-            print(f"{name}  weight {row.weight:.2f}  {row.reason}")
-    share = float(fitted.flagged_.mean())
+            print(f"{names[row.demo_id]}  weight {row.weight:.2f}  {row.reason}")
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
     warning = caution(len(fitted.weights_))
     if warning is not None:
         print(warning)
-    print(f"report: {arguments.out / 'report.html'}")
-    return 1 if share > arguments.max_flagged else 0
+    print(f"report: {out / 'report.html'}")
 
 
 def _fit(arguments: FitArguments) -> int:

@@ -16,10 +16,10 @@ from teasim.common.errors import ConfigError
 class FilterConfig:
     """How a pool is filtered."""
 
-    segmenter: str = "truth"
-    """Where segments come from: truth (the labels logged in the pool), clustering (the videos
+    segmenter: str = "logged"
+    """Where segments come from: logged (the sub-tasks logged in the pool), clustering (the videos
     alone), predictions (those stored in an MS-TCN folder), or the folder of a fitted segmenter; all
-    but truth read no logged label."""
+    but logged read no logged label."""
     subtasks: str = "auto"
     """Number of sub-tasks that clustering looks for; auto finds it out."""
     score: str = "norm"

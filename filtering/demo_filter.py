@@ -21,10 +21,9 @@ from filtering.judging.verdict import Evidence, Verdict, judge_named
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
-from filtering.vision.frames import chosen_cameras, main_camera
+from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
-from teasim.pool import Pool
-from teasim.pool.sequences import SequencePool, Source
+from teasim.pool.source import Source
 from teasim.pool.weight_table import WeightRow
 
 FEWEST_DEMOS = 3
@@ -147,7 +146,7 @@ class DemoFilter:
 
     def _cameras(self, pool: Source) -> tuple[str, ...]:
         """Return the cameras to look at, none where there are no pictures."""
-        if isinstance(pool, Pool):
+        if pool.cameras:
             return chosen_cameras(pool, self.config.cameras) or (main_camera(pool),)
         for setting in ABOUT_PICTURES:
             if getattr(self.config, setting) != getattr(FilterConfig, setting):
@@ -157,8 +156,6 @@ class DemoFilter:
         return ()
 
     def _segments(self, pool: Source, jobs: int) -> Segmentation:
-        if isinstance(pool, SequencePool):
-            return pool.segments(self.config.segmenter)
         segmenter = segmenter_named(self.config.segmenter, self.config.subtasks, self.cameras_)
         return segmenter(pool, jobs=jobs)
 
@@ -167,19 +164,21 @@ class DemoFilter:
         known = Evidence(self.segments_.subtasks, self.segments_.spans)
         if self.config.score == "equation3":
             return replace(known, states=self._states(pool, jobs))
-        if self.config.effects and isinstance(pool, Pool):
+        if self.config.effects and pool.cameras:
             return replace(known, idle=self._idle(pool, known, jobs))
         return known
 
-    def _idle(self, pool: Pool, known: Evidence, jobs: int) -> list[NDArray[np.float64]]:
+    def _idle(self, pool: Source, known: Evidence, jobs: int) -> list[NDArray[np.float64]]:
         """Return per demonstration (q,): surprise that so little came of each segment [nats]."""
         source = FrameSource(self.config.cameras or pool.cameras)
-        rests = look_at_rests(pool.episodes, self.segments_.spans, pool.fps, source, jobs=jobs)
+        rests = look_at_rests(
+            pool.episodes, self.segments_.spans, frame_rate(pool), source, jobs=jobs
+        )
         return effect_surprises([changes(rest) for rest in rests], known.labels)
 
     def _states(self, pool: Source, jobs: int) -> list[NDArray[np.float64]]:
         """Return per demonstration (q, N): what its segments look like, else which they are."""
-        if isinstance(pool, SequencePool):
+        if not pool.cameras:
             eye = np.eye(len(self.segments_.subtasks))
             return [eye[labels] for labels in self.segments_.labels()]
         features = describe_segments(

@@ -1,8 +1,6 @@
 """What a filter leaves behind: weight table, lists for other tools, record of the run, the page."""
 
-import json
 import platform
-import shlex
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
@@ -19,8 +17,7 @@ from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
 from teasim.common.errors import ConfigError, TeasimError
 from teasim.common.files import write_json, write_text
-from teasim.pool import Pool
-from teasim.pool.sequences import SequencePool, Source
+from teasim.pool.source import Source
 from teasim.pool.weight_table import write_weight_table
 
 FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
@@ -95,8 +92,8 @@ def write_filter_output(
         folder.mkdir(parents=True, exist_ok=True)
         write_weight_table(folder / "weights.csv", rows)
         write_json(folder / "filter.json", run_record(fitted, pool))
-        write_text(folder / "keep.txt", _keep_text(pool, keep))
-        write_text(folder / "exclude.txt", _exclude_text(pool, exclude))
+        write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
+        write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))
     except OSError as error:
         raise TeasimError(f"The output '{out}' cannot be written: {error.strerror}.") from error
     render_report(
@@ -139,83 +136,23 @@ def _by_demo(fitted: DemoFilter, values: NDArray[np.float64]) -> dict[str, float
     return {row.demo_id: float(v) for row, v in zip(fitted.table(), values, strict=True)}
 
 
-def video_list(pool: SequencePool, indexes: Sequence[int], purpose: str) -> str:
-    """Return the files of an MS-TCN folder in the form of its splits, without the first lines."""
-    files = [f"{pool.episodes[index].demo_id}.txt" for index in indexes]
-    return _list(
-        files,
-        f"{len(files)} videos to {purpose}, of {pool.root}",
-        "MS-TCN:    grep -v '^#' keep.txt > splits/keep.bundle",
-    )
-
-
-def _keep_text(pool: Source, keep: Sequence[int]) -> str:
-    if isinstance(pool, SequencePool):
-        return video_list(pool, keep, "keep")
-    return keep_list(pool, keep)
-
-
-def _exclude_text(pool: Source, exclude: Sequence[int]) -> str:
-    if isinstance(pool, SequencePool):
-        return video_list(pool, exclude, "leave out")
-    return exclude_list(pool, exclude)
-
-
-def keep_list(pool: Pool, keep: Sequence[int]) -> str:
-    """Return keep.txt: the kept episodes, and how to use only them."""
-    indexes = _json(keep)
-    root, name = shlex.quote(str(pool.root)), shlex.quote(f"local/{pool.root.name}")
-    demos = " ".join(f"demo_{index}" for index in keep)
-    return _list(
-        keep,
-        f"{len(keep)} demonstrations to keep, episode indexes of {pool.root}",
-        f"LeRobot:   lerobot-train --dataset.repo_id={name} --dataset.root={root} "
-        f'--dataset.episodes="{indexes}"',
-        f"robomimic: put these names into mask/keep and set train.hdf5_filter_key=keep: {demos}",
-        f"Minari:    dataset.filter_episodes(lambda episode: episode.id in {indexes})",
-    )
-
-
-def exclude_list(pool: Pool, exclude: Sequence[int]) -> str:
-    """Return exclude.txt: the flagged episodes, and how to leave them out."""
-    title = f"{len(exclude)} demonstrations to leave out, episode indexes of {pool.root}"
-    if not exclude:
-        return _list(exclude, title)
-    indexes = _json(exclude)
-    root, name = shlex.quote(str(pool.root)), shlex.quote(f"local/{pool.root.name}")
-    demos = " ".join(f"demo_{index}" for index in exclude)
-    copy = shlex.quote(f"local/{pool.root.name}_filtered")
-    return _list(
-        exclude,
-        title,
-        f"LeRobot:   lerobot-train --dataset.repo_id={name} --dataset.root={root} "
-        f'--dataset.exclude_episodes="{indexes}"   (needs a version after 0.6.1)',
-        f"LeRobot:   lerobot-edit-dataset --repo_id {name} --root {root} --new_repo_id {copy} "
-        f'--operation.type delete_episodes --operation.episode_indices "{indexes}"   '
-        "(makes a copy, without the columns teasim/*)",
-        f"robomimic: leave these names out of the mask you train on: {demos}",
-        f"Minari:    dataset.filter_episodes(lambda episode: episode.id not in {indexes})",
-    )
+def selection_text(pool: Source, indexes: Sequence[int], *, keep: bool) -> str:
+    """Return keep.txt or exclude.txt: demonstrations, and how other tools are told of them."""
+    purpose = "keep" if keep else "leave out"
+    title = f"{len(indexes)} demonstrations to {purpose}, of {pool.root}"
+    comments = [f"# {line}" for line in (title, *pool.usage(indexes, keep=keep))]
+    return "\n".join([*comments, *pool.entries(indexes)]) + "\n"
 
 
 def _segmentation_record(fitted: DemoFilter, pool: Source) -> dict[str, Any] | None:
     """Return what inferred the segments and how good they are, where that is known."""
     found = fitted.segments_
-    if isinstance(pool, SequencePool) or found.weights_sha256 is None:
+    if found.weights_sha256 is None:
         return None
     return {
         "weights_sha256": found.weights_sha256,
         "scores": scores_json(score_episodes(pool.episodes, found)),
     }
-
-
-def _list(entries: Sequence[int] | Sequence[str], *comments: str) -> str:
-    lines = [f"# {comment}" for comment in comments]
-    return "\n".join([*lines, *map(str, entries)]) + "\n"
-
-
-def _json(indexes: Sequence[int]) -> str:
-    return json.dumps(list(indexes), separators=(",", ":"))
 
 
 def _versions() -> dict[str, str]:

@@ -200,7 +200,7 @@ def draw(
     background = arguments.backgrounds[0]
     indices = segment_indices(episode.spans(), arguments.frames)
     found = _episode_maps(pool, episode, background, arguments)
-    clip = episode.video(arguments.camera)
+    clip = episode.clip(arguments.camera)
     for span, chosen, maps in zip(episode.spans(), indices, found, strict=True):
         frames = foreground(clip, chosen, "none")
         importance = generator.importance_[pool.subtasks.index(span.subtask)]
@@ -214,7 +214,7 @@ def draw_foregrounds(arguments: argparse.Namespace, episode: Episode) -> None:
     """Write a row per background: the middle of every other segment without it."""
     spans = episode.spans()[::2]
     chosen = np.array([(span.start + span.stop) // 2 for span in spans])
-    clip = episode.video(arguments.camera)
+    clip = episode.clip(arguments.camera)
     rows = [np.hstack(foreground(clip, chosen, name)) for name in BACKGROUNDS]
     imageio.imwrite(arguments.foregrounds, np.vstack(rows))
 
@@ -244,7 +244,7 @@ def _episode_maps(
     name = f"{pool.root.name}-{episode.index}-{arguments.camera}-{arguments.frames}-{background}"
     path = arguments.cache / f"{name}.npz"
     if not path.exists():
-        clip = episode.video(arguments.camera)
+        clip = episode.clip(arguments.camera)
         maps = segment_maps(clip, episode.spans(), arguments.frames, background)
         path.parent.mkdir(parents=True, exist_ok=True)
         np.savez(path, *maps)

@@ -23,7 +23,8 @@ from filtering.vision.frame_features import (
     sampled_frames,
     side_by_side,
 )
-from teasim.pool import Episode, Span, VideoClip
+from teasim.pool import Span
+from teasim.pool.source import Clip, Demonstration
 
 REST = 0.3
 """Moments up to this far from the border of two segments are averaged [s]. Not many: they help
@@ -36,7 +37,7 @@ CONSTANT = 0.1
 class RestTask:
     """One video to look at when it is at rest; small, so that it travels to a worker process."""
 
-    clip: VideoClip
+    clip: Clip
     """Where the frames are."""
     frames: tuple[int, ...]
     """The frames that are looked at, in order."""
@@ -59,7 +60,7 @@ def rest_features(
 
 
 def look_at_rests(
-    episodes: Sequence[Episode],
+    episodes: Sequence[Demonstration],
     segments: Sequence[tuple[Span, ...]],
     fps: float,
     source: FrameSource,
@@ -87,7 +88,7 @@ def look_at_rests(
         places.append([np.searchsorted(used, numbers) for numbers in chosen])
         for camera in source.cameras:
             seen = tuple(frames[used].tolist())
-            tasks.append(RestTask(episode.video(camera), seen, default_folder()))
+            tasks.append(RestTask(episode.clip(camera), seen, default_folder()))
     described = look_up_or_describe(tasks, _key, describe_rests, jobs)
     videos = side_by_side(described, len(source.cameras))
     return [_means(moments, chosen) for moments, chosen in zip(videos, places, strict=True)]

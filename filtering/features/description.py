@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from filtering.features.extraction import segment_features
 from teasim.common.errors import ConfigError
-from teasim.pool import Pool, Span
+from teasim.pool import Span
+from teasim.pool.source import Source
 
 POOLED = "pooled"
 """Mean and maximum over time of what the pretrained network sees, without anything learned."""
@@ -25,7 +26,7 @@ def check_description(name: str) -> None:
 
 def describe_segments(
     name: str,
-    pool: Pool,
+    pool: Source,
     segments: Sequence[tuple[Span, ...]],
     *,
     cameras: Sequence[str],

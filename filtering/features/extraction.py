@@ -11,7 +11,8 @@ from filtering.vision.background import subtraction_named
 from filtering.vision.cache import ArrayCache, default_folder
 from filtering.vision.frame_features import clip_key, look_up_or_describe, side_by_side
 from filtering.vision.frames import Frames, fit_size, segment_indices, uniform_indices
-from teasim.pool import Pool, Span, VideoClip, read_frames
+from teasim.pool import Span
+from teasim.pool.source import Clip, Source
 
 OVERVIEW = 31
 """Frames spread over the whole video from which its background is learnt."""
@@ -21,7 +22,7 @@ OVERVIEW = 31
 class VideoTask:
     """One video to describe; small, so that it travels to a worker process."""
 
-    clip: VideoClip
+    clip: Clip
     """Where the frames are."""
     spans: tuple[Span, ...]
     """The segments [frames]."""
@@ -34,7 +35,7 @@ class VideoTask:
 
 
 def segment_features(
-    pool: Pool,
+    pool: Source,
     segments: Sequence[tuple[Span, ...]],
     *,
     cameras: Sequence[str],
@@ -57,7 +58,7 @@ def segment_features(
     """
     subtraction_named(background)
     tasks = [
-        VideoTask(episode.video(camera), spans, frames_per_segment, background, default_folder())
+        VideoTask(episode.clip(camera), spans, frames_per_segment, background, default_folder())
         for episode, spans in zip(pool.episodes, segments, strict=True)
         for camera in cameras
     ]
@@ -75,7 +76,7 @@ def describe_video(task: VideoTask) -> NDArray[np.float32]:
     return features
 
 
-def foreground(clip: VideoClip, indices: NDArray[np.int64], background: str) -> Frames:
+def foreground(clip: Clip, indices: NDArray[np.int64], background: str) -> Frames:
     """Return frames of a clip (n, H, W, 3), `indices` in order of time, without the background.
 
     Raises:
@@ -84,7 +85,7 @@ def foreground(clip: VideoClip, indices: NDArray[np.int64], background: str) -> 
     """
     overview = uniform_indices(0, clip.length, OVERVIEW)
     wanted = np.unique(np.concatenate([indices, overview]))
-    frames = fit_size(read_frames(clip, wanted))
+    frames = fit_size(clip.frames(wanted))
     return subtraction_named(background)(
         frames[np.searchsorted(wanted, indices)], frames[np.searchsorted(wanted, overview)]
     )

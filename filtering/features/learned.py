@@ -16,7 +16,8 @@ from filtering.features.generator import FeatureGenerator
 from filtering.features.maps import segment_maps
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
-from teasim.pool import Episode, Pool, Span, VideoClip
+from teasim.pool import Span
+from teasim.pool.source import Clip, Demonstration, Source
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class LearnedFeatures:
     """Activations over time to one vector."""
 
     def describe(
-        self, pool: Pool, segments: Sequence[tuple[Span, ...]], *, jobs: int
+        self, pool: Source, segments: Sequence[tuple[Span, ...]], *, jobs: int
     ) -> list[NDArray[np.float64]]:
         """Return per demonstration (q, N): what each of its segments looks like.
 
@@ -62,14 +63,14 @@ class LearnedFeatures:
                 f"'{pool.root}' lacks; it has {', '.join(pool.cameras) or 'none'}."
             )
         tasks = [
-            _Task(episode.video(self.look.camera), spans, self)
+            _Task(episode.clip(self.look.camera), spans, self)
             for episode, spans in zip(pool.episodes, segments, strict=True)
         ]
         return parallel.run(_describe, tasks, jobs=jobs, description="looking at segments")
 
 
 def learn_features(
-    episodes: Sequence[Episode],
+    episodes: Sequence[Demonstration],
     subtasks: Sequence[str],
     look: LookConfig,
     bottleneck: BottleneckConfig | None = None,
@@ -83,7 +84,7 @@ def learn_features(
         ConfigError: fewer than two sub-tasks are shown, or a setting is out of range.
         PoolError: a video is missing or damaged.
     """
-    tasks = [_MapsTask(episode.video(look.camera), episode.spans(), look) for episode in episodes]
+    tasks = [_MapsTask(episode.clip(look.camera), episode.spans(), look) for episode in episodes]
     found = parallel.run(_maps, tasks, jobs=jobs, description="looking at labelled segments")
     clips = [maps for video in found for maps in video]
     labels = [subtasks.index(span.subtask) for task in tasks for span in task.spans]
@@ -94,14 +95,14 @@ def learn_features(
 
 @dataclass(frozen=True)
 class _MapsTask:
-    clip: VideoClip
+    clip: Clip
     spans: tuple[Span, ...]
     look: LookConfig
 
 
 @dataclass(frozen=True)
 class _Task:
-    clip: VideoClip
+    clip: Clip
     spans: tuple[Span, ...]
     learned: LearnedFeatures
 

@@ -5,15 +5,14 @@ from numpy.typing import NDArray
 
 from filtering.features.extraction import foreground
 from filtering.vision.frames import Frames, segment_indices
-from teasim.pool import Span, VideoClip
+from teasim.pool import Span
+from teasim.pool.source import Clip
 
 Maps = NDArray[np.float16]
 """Stride-16 feature maps of frames; half precision halves their memory.  # (n, C, h, w)"""
 
 
-def segment_maps(
-    clip: VideoClip, spans: tuple[Span, ...], count: int, background: str
-) -> list[Maps]:
+def segment_maps(clip: Clip, spans: tuple[Span, ...], count: int, background: str) -> list[Maps]:
     """Return per segment the feature maps (n, C, h, w) of at most `count` of its frames.
 
     Raises:

@@ -10,9 +10,9 @@ from filtering.demo_filter import DemoFilter
 from filtering.judging.explain import Clock, Finding, gravest
 from filtering.report.layout import Mark
 from filtering.report.page import DemoView, Segment
-from teasim.pool import VideoClip, read_frames
-from teasim.pool.sequences import SequencePool, Source
-from teasim.pool.videos import VideoWriter, video_content
+from filtering.vision.frames import frame_rate
+from teasim.pool.source import Clip, Source
+from teasim.pool.videos import VideoWriter
 
 
 def demo_views(pool: Source, fitted: DemoFilter) -> list[DemoView]:
@@ -28,25 +28,21 @@ def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
     clock = Clock(pool.fps)
     spans = fitted.segments_.spans[row]
     flagged = bool(fitted.flagged_[row])
-    if isinstance(pool, SequencePool):
-        name, length, video = pool.episodes[row].demo_id, spans[-1].stop, None
-    else:
-        episode = pool.episodes[row]
-        name, length = f"Video {episode.index}", episode.length
-        video = _mp4_of(episode.video(fitted.cameras_[0]), pool.fps)
+    episode = pool.episodes[row]
+    clip = episode.clip(fitted.cameras_[0]) if fitted.cameras_ else None
     return DemoView(
-        episode_index=pool.episodes[row].index,
-        name=name,
-        demo_id=pool.episodes[row].demo_id,
+        episode_index=episode.index,
+        name=episode.name[:1].upper() + episode.name[1:] if clip else episode.name,
+        demo_id=episode.demo_id,
         weight=float(fitted.weights_[row]),
         loss=float(fitted.losses_[row]),
         flagged=flagged,
         group=fitted.group_names_[fitted.groups_[row]] if fitted.group_names_ else "",
         reason=fitted.reasons_[row],
-        seconds=clock.time(length),
+        seconds=clock.time(episode.length),
         segments=tuple(Segment(s.subtask, clock.time(s.start), clock.time(s.stop)) for s in spans),
         marks=marks_of(fitted.findings_[row], clock) if flagged else (),
-        video=video,
+        video=None if clip is None else _mp4_of(clip, frame_rate(pool)),
     )
 
 
@@ -68,11 +64,12 @@ def _mark(finding: Finding, clock: Clock) -> Mark:
     return Mark(clock.time(finding.frame), text)
 
 
-def _mp4_of(clip: VideoClip, fps: float) -> bytes:
-    """Return the clip as an mp4 of its own; a file that holds more is cut by encoding anew."""
-    if clip.start_frame == 0 and video_content(clip.path).n_frames == clip.length:
-        return clip.path.read_bytes()
-    frames = read_frames(clip, np.arange(clip.length))
+def _mp4_of(clip: Clip, fps: float) -> bytes:
+    """Return the clip as an mp4 of its own; what no browser plays as it is is encoded anew."""
+    stored = clip.mp4()
+    if stored is not None:
+        return stored
+    frames = clip.frames(np.arange(clip.length))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         writer = VideoWriter(path, height=frames.shape[1], width=frames.shape[2], fps=round(fps))

@@ -15,9 +15,9 @@ from filtering.segmentation.discovery import discover
 from filtering.segmentation.scaling import scaled
 from filtering.segmentation.segments import Segmentation, spans_of
 from filtering.vision.frame_features import FrameSource, frame_features, moment_of_frames
-from filtering.vision.frames import chosen_cameras, main_camera
+from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
-from teasim.pool import Episode, Pool
+from teasim.pool.source import Demonstration, Source
 
 AUTO = "auto"
 """Number of sub-tasks that means: find it out."""
@@ -29,7 +29,7 @@ AVERAGES = 112
 
 
 def clustering(
-    pool: Pool, *, jobs: int = 1, subtasks: int | None = None, cameras: tuple[str, ...] = ()
+    pool: Source, *, jobs: int = 1, subtasks: int | None = None, cameras: tuple[str, ...] = ()
 ) -> Segmentation:
     """Find sub-tasks that the demonstrations of a pool have in common; labels are not read.
 
@@ -52,7 +52,7 @@ def clustering(
     # The order of the demonstrations in the pool must not matter, not even to rounding.
     order = sorted(range(len(pool.episodes)), key=lambda number: pool.episodes[number].demo_id)
     episodes = [pool.episodes[number] for number in order]
-    videos = looks(episodes, pool.fps, source, jobs=jobs)
+    videos = looks(episodes, frame_rate(pool), source, jobs=jobs)
     longest = max(map(len, videos))
     if subtasks is not None and subtasks > longest:
         raise ConfigError(
@@ -74,7 +74,7 @@ def clustering(
 
 
 def looks(
-    episodes: Sequence[Episode], fps: float, source: FrameSource, *, jobs: int
+    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, jobs: int
 ) -> list[NDArray[np.float64]]:
     """Return per demonstration (n, F) what is compared, each feature scaled within its video."""
     width = len(source.cameras)

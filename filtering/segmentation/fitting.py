@@ -31,15 +31,16 @@ from filtering.vision.frame_features import (
     frame_features,
     sampled_frames,
 )
-from filtering.vision.frames import chosen_cameras
+from filtering.vision.frames import chosen_cameras, frame_rate
 from teasim.common.errors import ConfigError, PoolError
 from teasim.common.files import check_new_folder, write_json
-from teasim.pool import Episode, Pool
 from teasim.pool.mstcn import (
     MSTCNFolder,
     is_mstcn_folder,
     write_predictions,
 )
+from teasim.pool.readers.registry import open_source
+from teasim.pool.source import Demonstration, Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
 USUAL_LABELLED = 12
@@ -98,13 +99,13 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         ConfigError: a setting does not fit the pool, or `out` is in use.
         PoolError: the pool is damaged, or has no labelled sub-tasks.
     """
-    pool = Pool.open(source)
+    pool = open_source(source)
     check_new_folder(out)
     frames = FrameSource(chosen_cameras(pool, config.cameras) or pool.cameras, config.rate)
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
     began = time.perf_counter()
-    features = frame_features(chosen, pool.fps, frames, jobs=jobs)
+    features = frame_features(chosen, frame_rate(pool), frames, jobs=jobs)
     videos = labelled_videos(chosen, features, subtasks)
     # Frames of no sub-task, where there are any, are one more label, the last.
     n_labels = max(len(subtasks), 1 + max(int(video.labels.max()) for video in videos))
@@ -114,7 +115,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
         subtasks=subtasks,
         source=frames,
         scaling=config.network.scaling,
-        shortest=least_seconds(videos, n_labels, frames.rate_in(pool.fps), config.shortest),
+        shortest=least_seconds(videos, n_labels, frames.rate_in(frame_rate(pool)), config.shortest),
         labelled=frozenset(episode.demo_id for episode in chosen),
     )
     effects = _learn_effects(pool, chosen, features, frames)
@@ -157,13 +158,13 @@ def predict(segmenter_folder: Path, source: Path, out: Path, *, jobs: int = 1) -
     if is_mstcn_folder(source):
         scores = _predict_folder(segmenter, MSTCNFolder.open(source), out)
     else:
-        scores = _predict_pool(segmenter, Pool.open(source), out, jobs)
+        scores = _predict_pool(segmenter, open_source(source), out, jobs)
     if scores:
         write_json(out / METRICS_FILE, scores_json(scores))
     return scores
 
 
-def _predict_pool(segmenter: MSTCNSegmenter, pool: Pool, out: Path, jobs: int) -> Scores:
+def _predict_pool(segmenter: MSTCNSegmenter, pool: Source, out: Path, jobs: int) -> Scores:
     found = segmenter.segment(pool, jobs=jobs)
     assert found.posteriors is not None
     scores = score_episodes(pool.episodes, found)
@@ -198,7 +199,7 @@ def _predict_folder(segmenter: MSTCNSegmenter, folder: MSTCNFolder, out: Path) -
     return {UNSEEN: segmentation_scores(pairs)} if pairs else {}
 
 
-def _divide(pool: Pool, config: FitConfig) -> tuple[list[Episode], list[Episode]]:
+def _divide(pool: Source, config: FitConfig) -> tuple[list[Demonstration], list[Demonstration]]:
     """Return the demonstrations whose labels are used, and the others."""
     if config.episodes and config.labelled is not None:
         raise ConfigError("Both episodes and a number of labelled ones were given; choose one.")
@@ -207,7 +208,7 @@ def _divide(pool: Pool, config: FitConfig) -> tuple[list[Episode], list[Episode]
     return chosen, [episode for episode in pool.episodes if episode.index not in used]
 
 
-def _named(pool: Pool, indexes: Sequence[int]) -> set[int]:
+def _named(pool: Source, indexes: Sequence[int]) -> set[int]:
     """Return the numbers that were asked for, all of demonstrations with labels."""
     by_index = {episode.index: episode for episode in pool.episodes}
     for index in indexes:
@@ -224,7 +225,7 @@ def _named(pool: Pool, indexes: Sequence[int]) -> set[int]:
     return set(indexes)
 
 
-def _drawn(pool: Pool, config: FitConfig) -> set[int]:
+def _drawn(pool: Source, config: FitConfig) -> set[int]:
     """Return the numbers of demonstrations drawn from those that have labels."""
     labelled = [episode for episode in pool.episodes if episode.spans()]
     if not labelled:
@@ -238,23 +239,25 @@ def _drawn(pool: Pool, config: FitConfig) -> set[int]:
     return {episode.index for episode in _draw(labelled, count, config.network.seed)}
 
 
-def _draw(episodes: Sequence[Episode], count: int, seed: int) -> list[Episode]:
+def _draw(episodes: Sequence[Demonstration], count: int, seed: int) -> list[Demonstration]:
     """Return at most `count` random ones in their order."""
     rng = np.random.default_rng(seed)
     drawn = rng.permutation(len(episodes))[:count]
     return [episodes[number] for number in sorted(drawn)]
 
 
-def _shown(episodes: Sequence[Episode]) -> set[str]:
+def _shown(episodes: Sequence[Demonstration]) -> set[str]:
     return {span.subtask for episode in episodes for span in episode.spans()}
 
 
-def _never_shown(chosen: Sequence[Episode], others: Sequence[Episode]) -> tuple[str, ...]:
+def _never_shown(
+    chosen: Sequence[Demonstration], others: Sequence[Demonstration]
+) -> tuple[str, ...]:
     return tuple(sorted(_shown(others) - _shown(chosen)))
 
 
 def labelled_videos(
-    episodes: Sequence[Episode],
+    episodes: Sequence[Demonstration],
     features: Sequence[NDArray[np.float32]],
     subtasks: tuple[str, ...],
 ) -> list[LabelledVideo]:
@@ -278,8 +281,8 @@ def least_seconds(
 
 
 def _learn_effects(
-    pool: Pool,
-    episodes: Sequence[Episode],
+    pool: Source,
+    episodes: Sequence[Demonstration],
     features: Sequence[NDArray[np.float32]],
     frames: FrameSource,
 ) -> EffectReader | None:
@@ -287,7 +290,7 @@ def _learn_effects(
     if len(episodes) < FEWEST_DEMOS:
         return None
     rests = [
-        rest_features(moments, episode.length, episode.spans(), pool.fps)
+        rest_features(moments, episode.length, episode.spans(), frame_rate(pool))
         for moments, episode in zip(features, episodes, strict=True)
     ]
     done = [[span.subtask for span in episode.spans()] for episode in episodes]
@@ -295,7 +298,7 @@ def _learn_effects(
 
 
 def _record(
-    pool: Pool, config: FitConfig, result: FitResult, history: Sequence[float], seconds: float
+    pool: Source, config: FitConfig, result: FitResult, history: Sequence[float], seconds: float
 ) -> dict[str, Any]:
     """Return what segmenter.json says about the fit, enough to repeat it."""
     return {

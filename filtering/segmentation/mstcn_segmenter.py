@@ -16,8 +16,10 @@ from filtering.vision.frame_features import (
     frame_features,
     moment_of_frames,
 )
+from filtering.vision.frames import frame_rate
 from teasim.common.errors import ConfigError
-from teasim.pool import Episode, Pool, Span
+from teasim.pool import Span
+from teasim.pool.source import Demonstration, Source
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class MSTCNSegmenter:
     labelled: frozenset[str]
     """demo_id of the demonstrations it was fitted to."""
 
-    def segment(self, pool: Pool, *, jobs: int = 1) -> Segmentation:
+    def segment(self, pool: Source, *, jobs: int = 1) -> Segmentation:
         """Return the segments of every demonstration; true labels are not read.
 
         Raises:
@@ -47,7 +49,7 @@ class MSTCNSegmenter:
         return self.segment_episodes(pool, pool.episodes, jobs=jobs)
 
     def segment_episodes(
-        self, pool: Pool, episodes: Sequence[Episode], *, jobs: int = 1
+        self, pool: Source, episodes: Sequence[Demonstration], *, jobs: int = 1
     ) -> Segmentation:
         """Return the segments of some demonstrations of a pool; see `segment`."""
         missing = [camera for camera in self.source.cameras if camera not in pool.cameras]
@@ -56,8 +58,8 @@ class MSTCNSegmenter:
                 f"The segmenter was fitted to the camera '{missing[0]}', which the pool "
                 f"'{pool.root}' lacks; it has {', '.join(pool.cameras) or 'none'}."
             )
-        features = frame_features(episodes, pool.fps, self.source, jobs=jobs)
-        rate = self.source.rate_in(pool.fps)
+        features = frame_features(episodes, frame_rate(pool), self.source, jobs=jobs)
+        rate = self.source.rate_in(frame_rate(pool))
         shortest = [max(1, round(seconds * rate)) for seconds in self.shortest]
         described = [
             self._segment_video(moments, episode.length, shortest)

@@ -15,8 +15,8 @@ from filtering.segmentation.metrics import (
 )
 from filtering.segmentation.segments import Segmentation
 from teasim.common.errors import PoolError
-from teasim.pool import Episode
 from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder
+from teasim.pool.source import Demonstration
 from teasim.pool.types import index_from_spans
 
 UNSEEN = "unseen"
@@ -26,7 +26,7 @@ LABELLED = "labelled"
 
 
 def score_episodes(
-    episodes: Sequence[Episode], found: Segmentation
+    episodes: Sequence[Demonstration], found: Segmentation
 ) -> dict[str, SegmentationScores]:
     """Return scores by UNSEEN and LABELLED; a part without known truth is left out.
 
@@ -64,7 +64,7 @@ def scores_json(scores: dict[str, SegmentationScores]) -> dict[str, Any]:
     return {part: asdict(s) for part, s in scores.items()}
 
 
-def _pair(episode: Episode, number: int, found: Segmentation) -> LabelPair | None:
+def _pair(episode: Demonstration, number: int, found: Segmentation) -> LabelPair | None:
     """Return what demonstration `number` shows and what was found; None without logged truth."""
     logged = episode.spans()
     if not logged:

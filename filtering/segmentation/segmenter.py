@@ -1,64 +1,84 @@
-"""Segments of every demonstration of a pool, by name of the segmenter."""
+"""Segments of every demonstration of a source, by name of the segmenter."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from filtering.segmentation.clustering import AUTO, clustering, subtask_count
 from filtering.segmentation.segments import Segmentation, Segmenter
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool import Episode, Pool, Span
+from teasim.pool import Span
+from teasim.pool.source import Demonstration, Source
 
 
-def truth(pool: Pool, *, jobs: int = 1) -> Segmentation:
-    """Use the sub-task spans logged in the pool.
+def logged(source: Source, *, jobs: int = 1) -> Segmentation:
+    """Use the sub-task spans logged in the source.
 
     Raises:
-        PoolError: a demonstration has no labelled sub-task, or a span leaves the video.
+        PoolError: a demonstration has no logged sub-task, or a span leaves it.
     """
     del jobs  # nothing to compute
-    spans = tuple(_logged_spans(episode) for episode in pool.episodes)
+    spans = [demo.spans() for demo in source.episodes]
+    return Segmentation(_names(source, spans), _checked(source, spans, "logged"))
+
+
+def predictions(source: Source, *, jobs: int = 1) -> Segmentation:
+    """Use the spans that a segmenter stored in the source, with its posteriors if all are there.
+
+    Raises:
+        PoolError: a demonstration has no stored span, or one that leaves it.
+    """
+    del jobs  # nothing to compute
+    spans = [demo.predicted_spans() for demo in source.episodes]
+    checked = _checked(source, spans, "predictions")
+    found = [demo.posteriors() for demo in source.episodes]
+    known = tuple(values for values in found if values is not None)
+    posteriors = known if len(known) == len(found) else None
+    return Segmentation(_names(source, spans), checked, posteriors)
+
+
+def _names(source: Source, spans: Sequence[tuple[Span, ...]]) -> tuple[str, ...]:
+    """Return the names of the sub-tasks of `spans`, as the source numbers them."""
     seen = {span.subtask for demo in spans for span in demo}
     # Some recorders log spans without a table of names; their order must not depend on the demos'.
-    names = pool.subtasks or tuple(sorted(seen))
+    names = source.subtasks or tuple(sorted(seen))
     unknown = sorted(seen - set(names))
     if unknown:
         raise PoolError(
-            f"The pool '{pool.root}' has segments of '{unknown[0]}', "
+            f"'{source.root}' has segments of '{unknown[0]}', "
             f"which is none of its sub-tasks {', '.join(names)}."
         )
-    return Segmentation(names, spans)
+    return names
 
 
-def _logged_spans(episode: Episode) -> tuple[Span, ...]:
-    spans = episode.spans()
+def _checked(
+    source: Source, spans: Sequence[tuple[Span, ...]], segmenter: str
+) -> tuple[tuple[Span, ...], ...]:
+    """Return the spans of every demonstration, which must have some and hold them."""
+    return tuple(
+        _checked_spans(source, demo, found, segmenter)
+        for demo, found in zip(source.episodes, spans, strict=True)
+    )
+
+
+def _checked_spans(
+    source: Source, demo: Demonstration, spans: tuple[Span, ...], segmenter: str
+) -> tuple[Span, ...]:
     if not spans:
         raise PoolError(
-            f"Demonstration {episode.index} has no labelled sub-tasks, which the segmenter 'truth' "
-            "needs (column subtask_index)."
+            f"The demonstration '{demo.name}' of '{source.root}' has no sub-tasks that the "
+            f"segmenter '{segmenter}' could read; choose another segmenter."
         )
-    if spans[-1].stop > episode.length:
+    if spans[-1].stop > demo.length:
         raise PoolError(
-            f"The sub-task '{spans[-1].subtask}' of demonstration {episode.index} ends at frame "
-            f"{spans[-1].stop}, after the last of its {episode.length} frames."
+            f"The sub-task '{spans[-1].subtask}' of the demonstration '{demo.name}' ends at frame "
+            f"{spans[-1].stop}, after the last of its {demo.length} frames."
         )
     return spans
 
 
-def predictions(pool: Pool, *, jobs: int = 1) -> Segmentation:
-    """Refuse a pool: stored predictions are those of an MS-TCN folder (`SequencePool`).
-
-    Raises:
-        ConfigError: always.
-    """
-    del jobs  # nothing to compute
-    raise ConfigError(
-        f"The segmenter 'predictions' reads predictions/*.txt of an MS-TCN folder, but "
-        f"'{pool.root}' is a pool; choose another segmenter."
-    )
-
-
 SEGMENTERS: dict[str, Segmenter] = {
-    "truth": truth,
+    "logged": logged,
     "clustering": clustering,
     "predictions": predictions,
 }
@@ -90,7 +110,7 @@ def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = 
             f"Unknown segmenter '{name}'; choose {', '.join(SEGMENTERS)} or the folder of one "
             "that `teasim segment fit` made."
         )
-    # Only here: true labels need no torch.
+    # Only here: logged labels need no torch.
     from filtering.segmentation.mstcn_checkpoint import load_segmenter
 
     return load_segmenter(Path(name)).segment

@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from teasim.pool import Pool, Span
+from teasim.pool import Span
+from teasim.pool.source import Source
 from teasim.pool.types import runs
 
 TINY = 1e-12
@@ -46,10 +47,10 @@ class Segmentation:
 
 
 class Segmenter(Protocol):
-    """Finds the segments of every demonstration of a pool."""
+    """Finds the segments of every demonstration of a source."""
 
-    def __call__(self, pool: Pool, *, jobs: int = 1) -> Segmentation:
-        """Return them in the order of `pool.episodes`; they do not depend on `jobs`."""
+    def __call__(self, source: Source, /, *, jobs: int = 1) -> Segmentation:
+        """Return them in the order of `source.episodes`; they do not depend on `jobs`."""
 
 
 def decode(

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -15,8 +16,7 @@ from filtering.vision.frames import fit_size, uniform_indices
 from filtering.vision.pretrained import feature_recipe
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
-from teasim.pool import Episode, VideoClip, read_frames
-from teasim.pool.videos import video_content
+from teasim.pool.source import Clip, Demonstration
 
 CHUNK = 64
 """Frames held in memory at a time; a multiple of the backbone's batch: it changes no bit."""
@@ -52,7 +52,7 @@ class FrameSource:
 class FrameTask:
     """One video to describe; small, so that it travels to a worker process."""
 
-    clip: VideoClip
+    clip: Clip
     """Where the frames are."""
     count: int
     """Moments to look at."""
@@ -89,7 +89,7 @@ def moment_of_frames(length: int, count: int) -> NDArray[np.int64]:
 
 
 def frame_features(
-    episodes: Sequence[Episode], fps: float, source: FrameSource, *, jobs: int
+    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, jobs: int
 ) -> list[NDArray[np.float32]]:
     """Return per demonstration (n, F * cameras), n = sample_count(...).
 
@@ -104,7 +104,7 @@ def frame_features(
     """
     tasks = [
         FrameTask(
-            episode.video(camera),
+            episode.clip(camera),
             sample_count(episode.length, fps, source.rate),
             default_folder(),
         )
@@ -146,26 +146,21 @@ def describe_moments(task: FrameTask) -> NDArray[np.float32]:
     return features
 
 
-def describe_clip(clip: VideoClip, wanted: NDArray[np.int64]) -> NDArray[np.float32]:
+def describe_clip(clip: Clip, wanted: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return the features (n, F) of the frames `wanted` of a clip, in order of time."""
     from filtering.vision.backbone import describe_frames
 
     parts = []
-    for first in range(0, len(wanted), CHUNK):
-        indices = wanted[first : first + CHUNK]
-        offset = int(indices[0])
-        rest = VideoClip(clip.path, clip.start_frame + offset, clip.length - offset)
-        parts.append(describe_frames(fit_size(read_frames(rest, indices - offset))))
+    stream = clip.stream(wanted)
+    while images := list(islice(stream, CHUNK)):
+        parts.append(describe_frames(fit_size(np.stack(images))))
     return np.concatenate(parts)
 
 
-def clip_key(clip: VideoClip, recipe: Sequence[Any]) -> str:
-    """Hash the encoded frames of a clip and all that is done to them (anything JSON can hold)."""
-    content = hashlib.sha256()
-    for digest in video_content(clip.path).digests[clip.start_frame :][: clip.length]:
-        content.update(digest)
-    content.update(json.dumps([*feature_recipe(), *recipe]).encode())
-    return content.hexdigest()
+def clip_key(clip: Clip, recipe: Sequence[Any]) -> str:
+    """Hash the pictures of a clip and all that is done to them (anything JSON can hold)."""
+    content = json.dumps([clip.digest(), *feature_recipe(), *recipe])
+    return hashlib.sha256(content.encode()).hexdigest()
 
 
 def _key(task: FrameTask) -> str:

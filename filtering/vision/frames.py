@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teasim.common.errors import ConfigError
-from teasim.pool import Pool, Span
+from teasim.pool import Span
+from teasim.pool.source import Source
 
 LARGEST_SIDE = 224
 """Frames whose shorter side is longer are area-averaged down to it [pixels]; the backbone was
@@ -46,22 +47,33 @@ def fit_size(frames: Frames) -> Frames:
     return np.stack([cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in frames])
 
 
-def main_camera(pool: Pool) -> str:
+def main_camera(pool: Source) -> str:
     """Return the camera that is used when none is named: MAIN_CAMERA, or else the first one."""
     return MAIN_CAMERA if MAIN_CAMERA in pool.cameras else pool.cameras[0]
 
 
-def chosen_cameras(pool: Pool, wanted: tuple[str, ...]) -> tuple[str, ...]:
+def chosen_cameras(pool: Source, wanted: tuple[str, ...]) -> tuple[str, ...]:
     """Return the cameras `wanted` of a pool; empty when none is named.
 
     Raises:
         ConfigError: the pool has no videos, or no camera of a name.
     """
     if not pool.cameras:
-        raise ConfigError(f"The pool '{pool.root}' has no videos to look at.")
+        raise ConfigError(f"'{pool.root}' has no pictures to look at.")
     for camera in wanted:
         if camera not in pool.cameras:
             raise ConfigError(
                 f"The pool has no camera '{camera}'; choose from {', '.join(pool.cameras)}."
             )
     return wanted
+
+
+def frame_rate(pool: Source) -> float:
+    """Return the frames per second of a pool with pictures [1/s].
+
+    Raises:
+        ConfigError: the rate is not known.
+    """
+    if pool.fps is None:
+        raise ConfigError(f"The frame rate of '{pool.root}' is not known; give it with --fps.")
+    return float(pool.fps)

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from policies.data.moments import Moments
 from policies.data.samples import DecisionSamples
-from policies.learners.networks import Moments
 from teasim.common.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow, read_weight_table

@@ -12,8 +12,9 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
+
+from policies.data.moments import Moments
 
 MAP_SCALE_FLOOR = 0.05
 """Least scale of a channel of the feature maps; one that never changes must not become noise."""
@@ -45,16 +46,6 @@ class NetworkShape:
     def features(self) -> int:
         """F, length of what the encoder makes of an observation."""
         return self.cameras * (self.bottleneck or self.channels) + self.low_dim
-
-
-@dataclass(frozen=True)
-class Moments:
-    """Mean and standard deviation of the inputs of a network over its training set."""
-
-    map_mean: NDArray[np.float64]  # (K, C)
-    map_deviation: NDArray[np.float64]  # (K, C)
-    low_dim_mean: NDArray[np.float64]  # (S,)
-    low_dim_deviation: NDArray[np.float64]  # (S,)
 
 
 class SubtaskNetwork(Protocol):

@@ -131,7 +131,7 @@ def _check_videos(pool: Pool) -> Iterator[str]:
     for camera in pool.cameras:
         ends: dict[Path, tuple[int, int]] = {}
         for episode in pool.episodes:
-            clip = episode.video(camera)
+            clip = episode.clip(camera)
             end = clip.start_frame + clip.length
             ends[clip.path] = max(ends.get(clip.path, (0, 0)), (end, episode.index))
         for path, (end, last) in ends.items():

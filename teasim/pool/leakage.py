@@ -51,7 +51,7 @@ def _segments(_: Pool, episode: Episode) -> float:
 
 def _motion(pool: Pool, episode: Episode) -> float:
     """Mean difference of the first camera's grey values over MOTION_STEP frames."""
-    clip = episode.video(pool.cameras[0])
+    clip = episode.clip(pool.cameras[0])
     frames = read_frames(clip, np.arange(0, episode.length, MOTION_STEP))
     grey = frames[:, ::2, ::2].mean(axis=3, dtype=np.float32)
     return float(np.abs(np.diff(grey, axis=0)).mean()) if len(grey) > 1 else 0.0
@@ -59,7 +59,7 @@ def _motion(pool: Pool, episode: Episode) -> float:
 
 def _file_size(pool: Pool, episode: Episode) -> float:
     """Bytes of the files that hold the demonstration's videos."""
-    paths = {episode.video(camera).path for camera in pool.cameras}
+    paths = {episode.clip(camera).path for camera in pool.cameras}
     return float(sum(path.stat().st_size for path in paths))
 
 

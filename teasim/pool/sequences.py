@@ -1,10 +1,11 @@
-"""A pool of step lists without pictures: an MS-TCN folder, read as the filter reads a pool.
+"""A source of step lists without pictures: the videos of an MS-TCN folder.
 
 Data sets of what people did often come as labels alone, and so do the predictions of other people's
 segmenters. Omissions, order and next steps can be judged from them all the same.
 """
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -12,14 +13,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.segmentation.segments import Segmentation
-from teasim.common.errors import ConfigError, PoolError
-from teasim.pool import Pool, Span
-from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder, is_mstcn_folder
-from teasim.pool.types import spans_from_index
-
-LABELS = ("truth", "predictions")
-"""Where the segments of such a folder may come from: groundTruth/*.txt or predictions/*.txt."""
+from teasim.common.errors import PoolError
+from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder
+from teasim.pool.source import Clip
+from teasim.pool.types import Span, spans_from_index
 
 
 @dataclass(frozen=True)
@@ -32,6 +29,25 @@ class LabelledSequence:
     """Name of the video."""
     index: int
     """Its number in alphabetical order, from 0."""
+    task: str = ""
+    """The task is not stored."""
+    record: None = None
+    """Whether it is correct is not stored."""
+
+    @property
+    def name(self) -> str:
+        """Name of the video."""
+        return self.demo_id
+
+    @property
+    def length(self) -> int:
+        """Number of labels: the true ones, or where they are not known the predicted ones.
+
+        Raises:
+            PoolError: the labels are missing or damaged.
+        """
+        truth = self.folder.truth(self.demo_id)
+        return len(self.folder.predictions(self.demo_id) if truth is None else truth)
 
     def spans(self) -> tuple[Span, ...]:
         """Return the true segments; none where they are not known.
@@ -50,6 +66,22 @@ class LabelledSequence:
         """
         return joined_spans(self.folder.predictions(self.demo_id), self.folder.names)
 
+    def posteriors(self) -> NDArray[np.float32] | None:
+        """Return the stored probability of each label in each frame, (n, T); None without.
+
+        Raises:
+            PoolError: the file is damaged.
+        """
+        return self.folder.posteriors(self.demo_id)
+
+    def clip(self, camera: str) -> Clip:
+        """Refuse: there are no pictures.
+
+        Raises:
+            PoolError: always.
+        """
+        raise PoolError(f"'{self.folder.root}' has no pictures, so it has no camera '{camera}'.")
+
 
 @dataclass(frozen=True)
 class SequencePool:
@@ -62,7 +94,7 @@ class SequencePool:
     episodes: tuple[LabelledSequence, ...]
     """The videos in alphabetical order."""
     fps: float | None = None
-    """Frames (lines) per second; None where nobody said, and times are counted in frames."""
+    """Frames (lines) per second; None where it is not known and times are counted in frames."""
     cameras: tuple[str, ...] = ()
     """None: there are no pictures."""
 
@@ -71,36 +103,11 @@ class SequencePool:
         """List the videos of an MS-TCN folder.
 
         Raises:
-            ConfigError: `fps` is not above 0.
             PoolError: the folder is no MS-TCN folder, or a damaged one.
         """
-        if fps is not None and not fps > 0:
-            raise ConfigError(f"fps is {fps}; choose a number above 0.")
         folder = MSTCNFolder.open(path)
         episodes = [LabelledSequence(folder, name, k) for k, name in enumerate(folder.videos)]
         return cls(folder.root, folder.names, tuple(episodes), fps)
-
-    def segments(self, source: str) -> Segmentation:
-        """Return the segments of all videos from `source`, one of LABELS.
-
-        Raises:
-            ConfigError: `source` needs pictures.
-            PoolError: labels are missing or damaged, or a video shows background alone.
-        """
-        if source not in LABELS:
-            raise ConfigError(
-                f"'{self.root}' has no pictures, which the segmenter '{source}' looks at; "
-                f"choose {' or '.join(LABELS)}."
-            )
-        predicted = source == "predictions"
-        spans = tuple(e.predicted_spans() if predicted else e.spans() for e in self.episodes)
-        for episode, found in zip(self.episodes, spans, strict=True):
-            if not found:
-                raise PoolError(
-                    f"The video '{episode.demo_id}' of '{self.root}' has no labelled segment, "
-                    f"which the segmenter '{source}' needs."
-                )
-        return Segmentation(self.subtasks, spans, self._posteriors() if predicted else None)
 
     def content_hash(self) -> str:
         """Return a SHA-256 over the names and labels of all videos."""
@@ -112,32 +119,14 @@ class SequencePool:
                 digest.update(path.read_bytes() if path.exists() else b"")
         return digest.hexdigest()
 
-    def _posteriors(self) -> tuple[NDArray[np.float32], ...] | None:
-        found = [episode.folder.posteriors(episode.demo_id) for episode in self.episodes]
-        known = tuple(values for values in found if values is not None)
-        return known if len(known) == len(found) else None
+    def entries(self, indexes: Sequence[int]) -> list[str]:
+        """Return the names of the label files, as in the folder's splits."""
+        return [f"{self.episodes[index].demo_id}.txt" for index in indexes]
 
-
-Source = Pool | SequencePool
-"""What can be filtered."""
-
-
-def open_source(path: Path, fps: float | None = None) -> Source:
-    """Open a pool or an MS-TCN folder.
-
-    Args:
-        path: the folder.
-        fps: frames per second of an MS-TCN folder, which does not say it itself.
-
-    Raises:
-        ConfigError: `fps` is not above 0, or was given for a pool, which has its own.
-        PoolError: it is neither, or damaged.
-    """
-    if is_mstcn_folder(path):
-        return SequencePool.open(path, fps)
-    if fps is not None:
-        raise ConfigError(f"The pool '{path}' has its own frame rate; leave out fps.")
-    return Pool.open(path)
+    def usage(self, indexes: Sequence[int], *, keep: bool) -> list[str]:
+        """Return the line that makes a split of the list."""
+        del indexes, keep  # the same line serves both lists
+        return ["MS-TCN:    grep -v '^#' keep.txt > splits/keep.bundle"]
 
 
 def joined_spans(labels: NDArray[np.int64], subtasks: tuple[str, ...]) -> tuple[Span, ...]:

@@ -8,7 +8,7 @@ import contextlib
 import hashlib
 import os
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -38,6 +38,46 @@ class VideoClip:
     length: int
     """Number of frames of the demonstration."""
 
+    def frames(self, indices: Sequence[int] | np.ndarray) -> np.ndarray:
+        """Return the frames `indices` as uint8 RGB (n, H, W, 3); see `read_frames`."""
+        return read_frames(self, indices)
+
+    def stream(self, indices: Sequence[int] | np.ndarray) -> Iterator[np.ndarray]:
+        """Yield the frames `indices`, which ascend, in one pass; see `teasim.pool.source.Clip`."""
+        return _decode_in_order(self, np.asarray(indices, dtype=np.int64))
+
+    def packet_digests(self) -> tuple[bytes, ...]:
+        """Return the SHA-256 of each encoded frame of the demonstration.
+
+        Raises:
+            PoolError: The file is missing or damaged, or ends before the demonstration does.
+        """
+        digests = video_content(self.path).digests
+        part = digests[self.start_frame : self.start_frame + self.length]
+        if len(part) < self.length:
+            raise PoolError(
+                f"The video '{self.path}' has {len(digests)} frames but the demonstration in it "
+                f"ends at frame {self.start_frame + self.length}."
+            )
+        return part
+
+    def digest(self) -> str:
+        """Return a hash of the encoded frames.
+
+        Raises:
+            PoolError: The file is missing or damaged.
+        """
+        return hashlib.sha256(b"".join(self.packet_digests())).hexdigest()
+
+    def mp4(self) -> bytes | None:
+        """Return the file's bytes if it holds this demonstration alone, else None.
+
+        Raises:
+            PoolError: The file is missing or damaged.
+        """
+        alone = self.start_frame == 0 and video_content(self.path).n_frames == self.length
+        return self.path.read_bytes() if alone else None
+
 
 def read_frames(clip: VideoClip, indices: Sequence[int] | np.ndarray) -> np.ndarray:
     """Frames `indices` of a clip, in the order asked for.
@@ -56,16 +96,12 @@ def read_frames(clip: VideoClip, indices: Sequence[int] | np.ndarray) -> np.ndar
     wanted, places = np.unique(np.asarray(indices, dtype=np.int64), return_inverse=True)
     if not wanted.size:
         raise IndexError("No frame index was given.")
-    if wanted[0] < 0 or wanted[-1] >= clip.length:
-        raise IndexError(
-            f"Frames {wanted[0]} to {wanted[-1]} were asked of a clip of {clip.length}."
-        )
-    frames = _decode_in_order(clip, wanted)
-    return frames[places]
+    return np.stack(list(_decode_in_order(clip, wanted)))[places]
 
 
-def _decode_in_order(clip: VideoClip, wanted: np.ndarray) -> np.ndarray:
-    """Decode the ascending frame numbers `wanted`; (len(wanted), H, W, 3) uint8 RGB."""
+def _decode_in_order(clip: VideoClip, wanted: np.ndarray) -> Iterator[np.ndarray]:
+    """Decode the ascending frame numbers `wanted`; each (H, W, 3) uint8 RGB."""
+    _check_inside(clip, wanted)
     cv2 = _opencv()
     if not clip.path.is_file():
         raise PoolError(f"The video '{clip.path}' is missing.")
@@ -73,25 +109,32 @@ def _decode_in_order(clip: VideoClip, wanted: np.ndarray) -> np.ndarray:
     try:
         if not capture.isOpened():
             raise PoolError(f"The video '{clip.path}' cannot be opened; it is damaged.")
-        if clip.start_frame:
-            capture.set(cv2.CAP_PROP_POS_FRAMES, clip.start_frame)
-        images: list[np.ndarray] = []
-        position = 0
+        first = clip.start_frame + (int(wanted[0]) if wanted.size else 0)
+        if first:
+            capture.set(cv2.CAP_PROP_POS_FRAMES, first)
+        position, shape = first - clip.start_frame, None
         for index in wanted.tolist():
             while position <= index and capture.grab():
                 position += 1
             image = capture.retrieve()[1] if position > index else None
-            if image is None or (images and image.shape != images[0].shape):
+            if image is None or shape not in (None, image.shape):
                 raise PoolError(
                     f"The video '{clip.path}' is damaged or too short: frame {index} of the "
                     f"{clip.length} of this demonstration cannot be read."
                 )
-            images.append(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+            shape = image.shape
+            yield cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
     except cv2.error as error:
         raise PoolError(f"The video '{clip.path}' cannot be decoded; it is damaged.") from error
     finally:
         capture.release()
-    return np.stack(images)
+
+
+def _check_inside(clip: VideoClip, wanted: np.ndarray) -> None:
+    if wanted.size and (wanted[0] < 0 or wanted[-1] >= clip.length):
+        raise IndexError(
+            f"Frames {wanted[0]} to {wanted[-1]} were asked of a clip of {clip.length}."
+        )
 
 
 def _opencv() -> Any:

@@ -41,18 +41,18 @@ def test_too_many_flagged_is_exit_code_1(
         (["--max-flagged", "2"], "--max-flagged is 2.0; choose a share from 0 to 1."),
         (
             ["--segmenter", "luck"],
-            "Unknown segmenter 'luck'; choose truth, clustering, predictions or the folder of one "
+            "Unknown segmenter 'luck'; choose logged, clustering, predictions or the folder of one "
             "that `teasim segment fit` made.",
         ),
         (
             ["--segmenter", "clustering", "--subtasks", "few"],
             "subtasks is 'few'; choose auto or a number from 1.",
         ),
-        (["--fps", "5"], "The pool '{pool}' has its own frame rate; leave out fps."),
+        (["--fps", "5"], "The pool '{pool}' stores its own frame rate; leave out fps."),
         (
             ["--segmenter", "predictions"],
-            "The segmenter 'predictions' reads predictions/*.txt of an MS-TCN folder, but '{pool}' "
-            "is a pool; choose another segmenter.",
+            "The demonstration 'video 0' of '{pool}' has no sub-tasks that the segmenter "
+            "'predictions' could read; choose another segmenter.",
         ),
         (["--camera", "roof"], "The pool has no camera 'roof'; choose from left, cup."),
         (["--jobs", "-1"], "jobs is -1; choose 1 or more."),

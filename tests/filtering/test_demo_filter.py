@@ -68,7 +68,7 @@ def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
     [
         (
             {"segmenter": "luck"},
-            "Unknown segmenter 'luck'; choose truth, clustering, predictions or the folder of one "
+            "Unknown segmenter 'luck'; choose logged, clustering, predictions or the folder of one "
             "that `teasim segment fit` made.",
         ),
         ({"score": "luck"}, "Unknown score 'luck'; choose norm, equation3."),
@@ -110,6 +110,7 @@ class _Unlabelled:
 
     class _Episode:
         index = 4
+        name = "video 4"
         length = 10
 
         def spans(self) -> tuple[()]:
@@ -118,17 +119,17 @@ class _Unlabelled:
     episodes = (_Episode(),)
 
 
-def test_truth_needs_labels() -> None:
+def test_logged_sub_tasks_must_be_there() -> None:
     with pytest.raises(PoolError) as caught:
-        segmenter_named("truth")(_Unlabelled())  # type: ignore[arg-type]
+        segmenter_named("logged")(_Unlabelled())  # type: ignore[arg-type]
     assert str(caught.value) == (
-        "Demonstration 4 has no labelled sub-tasks, which the segmenter 'truth' needs "
-        "(column subtask_index)."
+        "The demonstration 'video 4' of 'somewhere' has no sub-tasks that the segmenter 'logged' "
+        "could read; choose another segmenter."
     )
 
 
 def test_segment_labels_are_numbers_of_the_pools_subtasks(toy_pool: Pool) -> None:
-    found = segmenter_named("truth")(toy_pool)
+    found = segmenter_named("logged")(toy_pool)
     for labels, sequence in zip(found.labels(), TOY_SEQUENCES, strict=True):
         assert [found.subtasks[label] for label in labels] == list(sequence)
     assert np.max([max(labels) for labels in found.labels()]) < len(found.subtasks)

@@ -54,7 +54,7 @@ def test_features_of_all_cameras_stand_side_by_side(toy_pool: Pool):
     (found,) = frame_features([episode], toy_pool.fps, FrameSource(("cup", "left"), 5.0), jobs=1)
     moments = np.arange(1, episode.length, 2)
     for place, camera in enumerate(("cup", "left")):
-        expected = describe_frames(read_frames(episode.video(camera), moments))
+        expected = describe_frames(read_frames(episode.clip(camera), moments))
         part = found[:, place * FRAME_FEATURES : (place + 1) * FRAME_FEATURES]
         np.testing.assert_array_equal(part, expected)
 
@@ -64,7 +64,7 @@ def test_features_are_looked_up_and_depend_on_no_chunk(toy_pool: Pool, monkeypat
     monkeypatch.setenv("TEASIM_CACHE", str(tmp_path))
     whole = frame_features(episodes, toy_pool.fps, source, jobs=1)
     with monkeypatch.context() as patch:
-        patch.setattr(module, "read_frames", None)  # nothing is read again
+        patch.setattr(module, "describe_clip", None)  # nothing is read again
         again = frame_features(episodes, toy_pool.fps, source, jobs=1)
     monkeypatch.setenv("TEASIM_CACHE", str(tmp_path / "empty"))
     monkeypatch.setattr(module, "CHUNK", 8)

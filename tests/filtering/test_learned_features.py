@@ -66,7 +66,7 @@ def test_a_segment_becomes_the_maximum_of_the_kept_channels(folder, toy_pool):
     left_out = np.setdiff1d(np.arange(32), learned.generator.kept_)
     assert len(left_out) == 16
     assert not np.vstack(described)[:, left_out].any()
-    maps = segment_maps(episode.video("cup"), episode.spans(), 64, "median")
+    maps = segment_maps(episode.clip("cup"), episode.spans(), 64, "median")
     activations = learned.bottleneck.transform(maps)
     strongest = np.stack([segment.max(axis=0) for segment in activations])
     kept = learned.generator.kept_
@@ -77,7 +77,7 @@ def test_what_was_learned_comes_back_and_decides_the_same(folder, toy_pool):
     episodes = [toy_pool.episodes[number] for number in (0, 1, 3)]
     fresh = learn_features(episodes, toy_pool.subtasks, LookConfig("cup"))
     loaded = load_features(folder)
-    clips = segment_maps(episodes[0].video("cup"), episodes[0].spans(), 64, "median")
+    clips = segment_maps(episodes[0].clip("cup"), episodes[0].spans(), 64, "median")
     seen = fresh.bottleneck.transform(clips)
     for one, other in zip(seen, loaded.bottleneck.transform(clips), strict=True):
         np.testing.assert_array_equal(one, other)

@@ -14,10 +14,12 @@ from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import count_steps, steps_of_frames
 from filtering.judging.verdict import JUDGES
 from filtering.output import FILES
+from filtering.segmentation.segmenter import segmenter_named
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool, Span
 from teasim.pool.mstcn import write_predictions
-from teasim.pool.sequences import SequencePool, joined_spans, open_source
+from teasim.pool.readers.registry import open_source
+from teasim.pool.sequences import SequencePool, joined_spans
 from teasim.pool.weight_table import read_weight_table
 from tests.filtering.conftest import real_data
 from tests.toy_pool import SEQ_1
@@ -66,7 +68,7 @@ def test_a_few_demonstrations_come_with_a_caution(
     assert told in printed
 
 
-@pytest.mark.parametrize(("source", "wrong"), [("truth", ["v2"]), ("predictions", ["v2", "v4"])])
+@pytest.mark.parametrize(("source", "wrong"), [("logged", ["v2"]), ("predictions", ["v2", "v4"])])
 def test_a_folder_of_labels_is_filtered(
     folder: Path, tmp_path: Path, source: str, wrong: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -146,31 +148,32 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
 
 def test_a_segmenter_that_looks_at_pictures_is_refused(folder: Path) -> None:
     with pytest.raises(ConfigError) as caught:
-        SequencePool.open(folder).segments("some/segmenter")
-    assert str(caught.value) == (
-        f"'{folder}' has no pictures, which the segmenter 'some/segmenter' looks at; "
-        "choose truth or predictions."
-    )
+        DemoFilter(FilterConfig(segmenter="clustering")).fit(SequencePool.open(folder))
+    assert str(caught.value) == f"'{folder}' has no pictures to look at."
 
 
 def test_videos_without_labels_are_named(folder: Path) -> None:
     (folder / "groundTruth" / "v3.txt").write_text("background\n")
     pool = SequencePool.open(folder)
-    with pytest.raises(PoolError, match=r"'v3' of '.*' has no labelled segment"):
-        pool.segments("truth")
+    with pytest.raises(PoolError) as caught:
+        segmenter_named("logged")(pool)
+    assert str(caught.value) == (
+        f"The demonstration 'v3' of '{folder}' has no sub-tasks that the segmenter 'logged' could "
+        "read; choose another segmenter."
+    )
     (folder / "predictions" / "v1.txt").unlink()
     with pytest.raises(PoolError, match=r"v1\.txt' cannot be read: No such file"):
-        pool.segments("predictions")
+        segmenter_named("predictions")(pool)
 
 
 def test_posteriors_come_along_when_every_video_has_them(folder: Path) -> None:
     pool = SequencePool.open(folder)
-    found = pool.segments("predictions").posteriors
+    found = segmenter_named("predictions")(pool).posteriors
     assert found is not None
     assert found[4].shape == (len(NO_WATER), 7)
-    assert pool.segments("truth").posteriors is None
+    assert segmenter_named("logged")(pool).posteriors is None
     (folder / "posteriors" / "v1.npy").unlink()
-    assert pool.segments("predictions").posteriors is None
+    assert segmenter_named("predictions")(pool).posteriors is None
 
 
 def test_background_within_a_sub_task_does_not_end_it() -> None:

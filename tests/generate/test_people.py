@@ -66,7 +66,7 @@ def test_a_film_of_a_person_has_no_log(films):
 def test_a_random_look_films_the_same_demonstration(films):
     fixed, other = (films[look].episodes[0] for look in ("fixed", "random"))
     assert fixed.length == other.length
-    pictures = [read_frames(episode.video("left"), [5]) for episode in (fixed, other)]
+    pictures = [read_frames(episode.clip("left"), [5]) for episode in (fixed, other)]
     assert np.abs(np.subtract(*pictures, dtype=np.int16)).mean() > 3
 
 

@@ -26,7 +26,7 @@ def test_decisions_of_a_pool(decisions):
 def test_the_first_view_is_the_frame_at_the_start_of_the_span(fake_pool, decisions):
     episode = fake_pool.episodes[0]
     starts = [span.start for span in episode.spans()]
-    frames = {camera: read_frames(episode.video(camera), starts) for camera in ("left", "cup")}
+    frames = {camera: read_frames(episode.clip(camera), starts) for camera in ("left", "cup")}
     maps = camera_maps(frames, ("left", "cup")).astype(float)
     # The batches differ, and with them the last bit of a half.
     np.testing.assert_allclose(decisions.maps[:7, 0], maps, rtol=2e-3, atol=2e-3)

@@ -151,7 +151,7 @@ def test_a_video_cut_short_is_told(toy_pool: Pool, tmp_path: Path, with_manifest
     other = make_toy_pool(
         tmp_path / "short", [("stir",)], size=48, frames_per_subtask=6, cameras=("left",)
     )
-    shutil.copy(other.episodes[0].video("left").path, root / VIDEO)
+    shutil.copy(other.episodes[0].clip("left").path, root / VIDEO)
     if not with_manifest:
         (root / MANIFEST).unlink()
     assert (
@@ -201,7 +201,7 @@ def read_everything(root: Path) -> None:
         assert episode.record is None or episode.record.sequence
         for name in ("observation.state", "action", "next.success", "subtask_index"):
             assert len(episode.column(name)) == episode.length
-        frames = read_frames(episode.video("left"), np.arange(episode.length))
+        frames = read_frames(episode.clip("left"), np.arange(episode.length))
         assert frames.shape[0] == episode.length
 
 

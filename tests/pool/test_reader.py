@@ -93,7 +93,7 @@ def test_what_is_written_is_read(
         np.testing.assert_array_equal(episode.column("next.reward"), np.arange(n) / 2)
         np.testing.assert_array_equal(episode.column("next.success"), np.arange(n) % 2 == 1)
         np.testing.assert_array_equal(episode.column("next.done"), np.arange(n) == n - 1)
-        levels = read_frames(episode.video("left"), range(n)).mean((1, 2, 3))
+        levels = read_frames(episode.clip("left"), range(n)).mean((1, 2, 3))
         np.testing.assert_allclose(levels, 20 * np.arange(n), atol=4)
         assert episode.content_id() == episode.demo_id
     assert check_pool(root) == []
@@ -131,7 +131,7 @@ def test_a_foreign_data_set_opens_without_ground_truth(foreign_pool: Pool) -> No
         assert episode.column("action").shape == (episode.length, 6)
         np.testing.assert_array_equal(episode.column("frame_index"), np.arange(episode.length))
         assert (episode.column("episode_index") == episode.index).all()
-        assert read_frames(episode.video("cam_top"), [0, episode.length - 1]).shape[0] == 2
+        assert read_frames(episode.clip("cam_top"), [0, episode.length - 1]).shape[0] == 2
         total += episode.length
     assert total == foreign_pool.info["total_frames"]
     assert len({episode.demo_id for episode in foreign_pool.episodes}) == len(foreign_pool.episodes)
@@ -162,7 +162,7 @@ def test_without_ground_truth_a_filter_sees_the_same(toy_pool: Pool, tmp_path: P
 def test_a_changed_pixel_or_label_changes_the_hash(toy_pool: Pool, tmp_path: Path) -> None:
     copy = Pool.open(copy_pool(toy_pool, tmp_path / "copy"))
     assert copy.content_hash() == toy_pool.content_hash()
-    first, second = (copy.episodes[i].video("left").path for i in (0, 1))
+    first, second = (copy.episodes[i].clip("left").path for i in (0, 1))
     shutil.copy(first, second)
     assert copy.content_hash() != toy_pool.content_hash()
 
@@ -185,7 +185,7 @@ def test_identity_survives_renumbering(tmp_path: Path) -> None:
     one = make_toy_pool(tmp_path / "one", [SEQ_1], **options)  # type: ignore[arg-type]
     header = toy_header([SEQ_1], size=16, cameras=("left",))
     source = one.episodes[0]
-    frames = read_frames(source.video("left"), range(source.length))
+    frames = read_frames(source.clip("left"), range(source.length))
     for index in (0, 1):
         with EpisodeWriter(tmp_path / "two", index, header) as writer:
             for frame in range(source.length):
@@ -203,7 +203,7 @@ def test_identity_survives_renumbering(tmp_path: Path) -> None:
 def test_unknown_names_are_answered_with_the_choices(toy_pool: Pool) -> None:
     episode = toy_pool.episodes[0]
     with pytest.raises(PoolError) as caught:
-        episode.video("right")
+        episode.clip("right")
     assert str(caught.value) == "The pool has no camera 'right'; it has left, cup."
     with pytest.raises(PoolError, match=r"has no column 'force'; it has observation\.state, act"):
         episode.column("force")

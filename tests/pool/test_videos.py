@@ -55,7 +55,7 @@ def test_any_selection_is_a_selection_of_the_whole(
 
 
 def test_a_clip_inside_a_foreign_file_starts_at_its_own_frame(foreign_pool: Pool) -> None:
-    clips = [episode.video("cam_top") for episode in foreign_pool.episodes]
+    clips = [episode.clip("cam_top") for episode in foreign_pool.episodes]
     whole = VideoClip(clips[0].path, 0, sum(clip.length for clip in clips))
     frames = read_frames(whole, range(whole.length))
     assert len({clip.path for clip in clips}) == 1

@@ -14,8 +14,9 @@ from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, read_column
 from teasim.pool.lerobot.identity import demo_id, is_content
 from teasim.pool.lerobot.metadata import Metadata, Row, read_metadata
+from teasim.pool.selection import lerobot_usage
 from teasim.pool.types import GroundTruth, MistakeSpan, Span, spans_from_index
-from teasim.pool.videos import VideoClip, video_content
+from teasim.pool.videos import VideoClip
 
 
 class Episode:
@@ -36,6 +37,11 @@ class Episode:
     def index(self) -> int:
         """Number of the demonstration in its pool."""
         return int(self.row["episode_index"])
+
+    @property
+    def name(self) -> str:
+        """What a person calls it."""
+        return f"video {self.index}"
 
     @property
     def length(self) -> int:
@@ -63,16 +69,7 @@ class Episode:
         Raises:
             PoolError: A file is missing or damaged, or ends too early.
         """
-        videos = {}
-        for camera in self._meta.video_keys:
-            clip = self.video(camera)
-            digests = video_content(clip.path).digests
-            videos[camera] = digests[clip.start_frame : clip.start_frame + clip.length]
-            if len(videos[camera]) < clip.length:
-                raise PoolError(
-                    f"The video '{clip.path}' has {len(digests)} frames but demonstration "
-                    f"{self.index} ends at frame {clip.start_frame + clip.length}."
-                )
+        videos = {camera: self.clip(camera).packet_digests() for camera in self._meta.video_keys}
         names = [name for name in self._meta.info["features"] if is_content(name)]
         logs = {
             name: self.column(name) for name in names if name not in self._meta.video_keys.values()
@@ -150,6 +147,13 @@ class Episode:
             return ()
         return spans_from_index(self.column(layout.SUBTASK_INDEX), self._meta.subtasks)
 
+    def predicted_spans(self) -> tuple[Span, ...]:
+        """Return nothing: a pool stores no predictions."""
+        return ()
+
+    def posteriors(self) -> None:
+        """Return nothing: a pool stores no predictions."""
+
     @property
     def data_path(self) -> Path:
         """The parquet file that holds the demonstration's log."""
@@ -174,7 +178,7 @@ class Episode:
             )
         return as_numpy(part, name)
 
-    def video(self, camera: str) -> VideoClip:
+    def clip(self, camera: str) -> VideoClip:
         """The demonstration's frames by `camera` (short name).
 
         Raises:
@@ -253,6 +257,14 @@ class Pool:
             names = next(iter(names.values()), None)
         width = int(feature["shape"][0])
         return tuple(map(str, names)) if names else tuple(f"state_{i}" for i in range(width))
+
+    def entries(self, indexes: Sequence[int]) -> list[str]:
+        """Return the episode indexes as text."""
+        return [str(index) for index in indexes]
+
+    def usage(self, indexes: Sequence[int], *, keep: bool) -> list[str]:
+        """Return lines for LeRobot, robomimic and Minari."""
+        return lerobot_usage(self.root, indexes, keep=keep)
 
     def content_hash(self) -> str:
         """Hash of all a filter sees: frames, logs, sub-task labels, fps and cameras.

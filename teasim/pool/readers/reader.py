@@ -1,0 +1,37 @@
+"""What a reader is made of."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from teasim.common.errors import ConfigError
+from teasim.pool.source import Source
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What a user may have to say about a source because its format does not."""
+
+    fps: float | None = None
+    """Frames per second of a source that does not store it [1/s]; None means not said."""
+
+    def __post_init__(self) -> None:
+        """Refuse options out of range.
+
+        Raises:
+            ConfigError: `fps` is not above 0.
+        """
+        if self.fps is not None and not self.fps > 0:
+            raise ConfigError(f"fps is {self.fps}; choose a number above 0.")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One format: how it is recognised and how it is opened."""
+
+    name: str
+    """What the format is called in messages and help texts."""
+    recognises: Callable[[Path], bool]
+    """Whether a path holds this format, be it a damaged one; it reads no more than it has to."""
+    open: Callable[[Path, ReadOptions], Source]
+    """Opens the path; raises PoolError when it is damaged and ConfigError for a wrong option."""
