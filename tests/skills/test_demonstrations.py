@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from teasim.rollout import demonstrate, replay, run_subtask
-from teasim.skills.arm import Style
+from teasim.skills.style import Style
 from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1, SEQ_2
 from teasim.task.scoring import judge

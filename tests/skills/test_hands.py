@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from teasim.common.errors import SkillError
 from teasim.constants import ARMS
 from teasim.rollout import run_subtask
-from teasim.skills.arm import Style
 from teasim.skills.geometry import DOWN, pose, position, rotation, tool, turn_angle
 from teasim.skills.ik import kinematics
+from teasim.skills.style import Style
 from teasim.world.embodiments import EMBODIMENTS, PERSON
 from teasim.world.monitor import Monitor
 from teasim.world.person import HAND_RANGE, HANDS_READY

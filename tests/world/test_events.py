@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from teasim.constants import GRIPPER_SQUEEZE, STATE_NAMES
-from teasim.world.liquids import CUP_FLOOR, VESSELS
+from teasim.world.liquids import CUP_BASE, VESSELS
 from teasim.world.station import body_name
 
 LEFT_HAND = STATE_NAMES.index("left_gripper")
@@ -114,15 +114,15 @@ def stir(simulation, turns: float, *, depth: float, radius: float = 0.015) -> No
 def test_two_turns_in_the_liquid_are_stirring(simulation, direction):
     simulation.liquids.cup["water"] = 50.0
     simulation.recogniser._counted["water"] = 50.0
-    stir(simulation, 1.8, depth=CUP_FLOOR + 0.003, radius=direction * 0.015)
+    stir(simulation, 1.8, depth=CUP_BASE + 0.003, radius=direction * 0.015)
     assert simulation.events == ()
-    stir(simulation, 2.3, depth=CUP_FLOOR + 0.003)
+    stir(simulation, 2.3, depth=CUP_BASE + 0.003)
     assert simulation.subtasks_done == ("stir",)
 
 
 @pytest.mark.parametrize(
     ("water", "depth", "radius"),
-    [(0.0, CUP_FLOOR + 0.003, 0.015), (50.0, 0.05, 0.015), (50.0, CUP_FLOOR + 0.003, 0.06)],
+    [(0.0, CUP_BASE + 0.003, 0.015), (50.0, 0.05, 0.015), (50.0, CUP_BASE + 0.003, 0.06)],
     ids=["empty", "above the liquid", "beside the cup"],
 )
 def test_turns_elsewhere_are_not(simulation, water, depth, radius):
