@@ -38,7 +38,7 @@ QUALITIES = ("fast", "nice")
 
 
 def assets_folder() -> Path:
-    """Return the folder of the MJCF models, in the installed package or next to it in a source tree."""
+    """Return the folder of the MJCF models: in the installed package, or next to it in a clone."""
     package = Path(str(files("teasim")))
     shipped = package / "assets"
     return shipped if shipped.is_dir() else package.parent / "assets"

@@ -3,8 +3,8 @@
 EGL comes first (it finds a graphics card and falls back to the processor by itself), OSMesa second
 (the processor only). Both give identical frames on a machine without a graphics card.
 
-MuJoCo takes the back end from the environment variable MUJOCO_GL at the time it is imported, and has
-no other interface for it. `choose_gl` therefore writes this variable, and no other one, in this
+MuJoCo takes the back end from the environment variable MUJOCO_GL at the time it is imported, and
+has no other interface for it. `choose_gl` therefore writes this variable, and no other one, in this
 process and for its children. It never replaces a value that the user has set.
 """
 

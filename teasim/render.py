@@ -160,7 +160,7 @@ class StationRenderer:
         return np.asarray(renderer.render())
 
     def _measuring(self) -> mujoco.Renderer:
-        """Return a renderer without smoothing, which would mix the numbers on both sides of an edge."""
+        """Return a renderer without smoothing, which would mix the numbers at an edge."""
         if self._quality == "fast":
             return self._renderer
         if self._meter is None:

@@ -28,8 +28,8 @@ class Step:
     position: int
     """Index of that sub-task in the demonstration."""
     target: np.ndarray
-    """Target, float32 as it is logged: joint angles [rad] and openings [m] (16,) for YuMi, (14,) for
-    a person."""
+    """Target, float32 as it is logged: joint angles [rad] and openings [m] (16,) for YuMi, (14,)
+    for a person."""
 
 
 def demonstrate(

@@ -21,8 +21,8 @@ class GenerateArguments:
     config: Annotated[GenerateConfig, tyro.conf.arg(name="")]
     """The settings of the pool."""
     preset: str | None = None
-    """A named set of pools. paper: the pools of the paper, 36 videos of people and 12 of YuMi, in two
-    folders below POOL; counts and participants are not used then."""
+    """A named set of pools. paper: the pools of the paper, 36 videos of people and 12 of YuMi, in
+    two folders below POOL; counts and participants are not used then."""
     jobs: int | None = None
     """Number of processes, by default one per core; the result does not depend on it."""
     backend: str = "loky"

@@ -44,8 +44,8 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
     """The tea-making station; subclasses define the actions.
 
     `metadata["violations"]` has every violation by its key, in words: "unsafe" stands for
-    `info["unsafe"]`, all other keys can occur in `info["violations"]`. `metadata["violation_kinds"]`
-    has the keys that are counted together, by the words for the kind.
+    `info["unsafe"]`, all other keys can occur in `info["violations"]`.
+    `metadata["violation_kinds"]` has the keys that are counted together, by the words for the kind.
     """
 
     metadata = {  # noqa: RUF012 (as Gymnasium declares it)
@@ -107,12 +107,12 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         super().reset(seed=seed)
         randomize = (options or {}).get("randomize", self._randomize)
         self._simulation.reset(draw_layout(self.np_random, randomize=randomize))
-        if self._look_kind == "random":  # otherwise nothing is drawn, so that layouts stay the same
+        if self._look_kind == "random":  # otherwise nothing is drawn, and layouts stay
             self._wear(sample_look(self.np_random))
         return self._observation(), self._info(self._verdict())
 
     def render(self) -> Any:
-        """Return a picture (height, width, 3) uint8 of the first camera; None without a render mode."""
+        """Return a picture (height, width, 3) uint8 of the first camera, or None."""
         if self.render_mode is None:
             return None
         return self._pictures().frames(self._cameras[:1])[self._cameras[0]]
@@ -134,7 +134,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
     def get_state(self) -> EnvState:
         """Return everything that the environment's future depends on, but the actions to come.
 
-        It does not hold the state of wrappers, such as the steps that Gymnasium's `TimeLimit` counts.
+        The state of wrappers, such as the step count of `TimeLimit`, is not part of it.
         """
         return EnvState(
             type(self).__name__,

@@ -12,7 +12,7 @@ import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
 from teasim.common.errors import ConfigError
-from teasim.task.subtasks import ROWS
+from teasim.task.recipes import OPTIONAL
 from teasim.world.pictures import check_cameras, check_picture
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 SIZES = (32, 1024)
 """Smallest and largest side of a video [pixels]."""
-OPTIONAL = tuple(row.name for row in ROWS if row.optional)
-"""Sub-tasks that a pool may declare optional."""
 MISTAKE_FORMAT = "NAME[@SUBTASK][+NAME...][:COUNT]"
 """How a mistake and a count are written on the command line."""
 

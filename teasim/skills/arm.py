@@ -139,7 +139,7 @@ class Arm:
     # -- grasps ----------------------------------------------------------------------------------
 
     def easier(self, grasp: SE3) -> SE3:
-        """Return the grasp, or the grasp with exchanged fingers if that is nearer to the posture."""
+        """Return the grasp, or that with exchanged fingers if it is nearer to the posture."""
         other = flipped(grasp)
         return grasp if self._distance(grasp) <= self._distance(other) else other
 

@@ -115,7 +115,7 @@ def test_the_header_tells_how_the_pool_was_made():
         ({"legal": -1}, "--legal is -1; give 0 or more demonstrations."),
         (
             {"optional": ("add_water",)},
-            "'add_water' is no optional ingredient; choose add_sugar, add_milk.",
+            "'add_water' is not optional; choose add_sugar, add_milk.",
         ),
         ({"seed": -1}, "The seed is -1; choose 0 or more."),
     ],
