@@ -178,8 +178,10 @@ WATCHERS: Mapping[type, Any] = MappingProxyType(
 """What watches for each kind of physical event of `teasim.task.subtasks`."""
 
 
-class Recogniser:
+class Recogniser(Saved):
     """Watches for the events of all sub-tasks and records the sub-tasks that happen."""
+
+    SAVED = ("events", "oven_on", "_watchers")
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
