@@ -1,46 +1,31 @@
-"""Pools of demonstrations: planned, carried out in physics, checked, and written with video."""
+"""Pools of demonstrations: planned, carried out in physics, checked, and written with video.
 
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
+The names below are imported when they are first used: the settings alone need no simulator.
+"""
 
-from teasim.common.parallel import check_workers, run
-from teasim.generate.config import GenerateConfig
-from teasim.generate.plan import DemoPlan, plan_pool
-from teasim.generate.recording import demo_rng, generate_demo, pool_header
-from teasim.gl import choose_gl
-from teasim.pool import Pool, claim_folder, episode_is_done, finalize_pool
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from teasim.generate.config import GenerateConfig
+    from teasim.generate.making import Generated, generate
+    from teasim.generate.plan import DemoPlan, plan_pool
+    from teasim.generate.recording import demo_rng
 
 __all__ = ["DemoPlan", "GenerateConfig", "Generated", "demo_rng", "generate", "plan_pool"]
 
+_MODULES = {
+    "DemoPlan": "plan",
+    "GenerateConfig": "config",
+    "Generated": "making",
+    "demo_rng": "recording",
+    "generate": "making",
+    "plan_pool": "plan",
+}
 
-@dataclass(frozen=True)
-class Generated:
-    """A finished pool and what it took."""
 
-    pool: Pool
-    """The pool."""
-    remade: int
-    """Demonstrations thrown away because they did not come out as labelled."""
-
-
-def generate(
-    root: Path | str, config: GenerateConfig, *, jobs: int = 1, backend: str = "loky"
-) -> Generated:
-    """Make a pool below `root`, in `jobs` processes; an interrupted one is continued.
-
-    Raises:
-        ConfigError: `jobs` or `backend` makes no sense.
-        PoolError: `root` is in use.
-        GenerationError: a demonstration never came out as labelled.
-        RenderError: no headless OpenGL back end works.
-    """
-    check_workers(jobs, backend)
-    choose_gl()  # without it nothing can be filmed, so nothing is begun
-    plans = plan_pool(config)
-    header = pool_header(config)
-    claim_folder(Path(root), header)
-    waiting = [plan for plan in plans if not episode_is_done(root, plan.index, header)]
-    make = partial(generate_demo, Path(root), config)
-    attempts = run(make, waiting, jobs=jobs, backend=backend, description="demonstrations")
-    return Generated(finalize_pool(root, header, len(plans)), sum(attempts) - len(attempts))
+def __getattr__(name: str) -> Any:
+    """Import what is asked for from the module that defines it."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
