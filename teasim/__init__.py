@@ -6,12 +6,27 @@ need of it and does not load it.
 """
 
 import sys
+from importlib import import_module
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from teasim.generation import generate as generate
+    from teasim.pool import Pool as Pool
 
 __version__ = "0.1.0"
+
+_ENTRY_POINTS = {"Pool": "teasim.pool", "generate": "teasim.generation"}
+"""Public name -> module that defines it; imported when it is first used."""
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used, so that `import teasim` is fast."""
+    if name not in _ENTRY_POINTS:
+        raise AttributeError(f"module 'teasim' has no attribute '{name}'")
+    return getattr(import_module(_ENTRY_POINTS[name]), name)
 
 
 def _register_envs() -> None:
