@@ -117,7 +117,7 @@ def replay(
     Args:
         simulation: the station; it is reset to the layout that `rng` draws.
         targets: the log, the column `action` of a pool: angles [rad] and openings [m] (16,) each.
-        rng: a generator as `demonstrate` was given it; `teasim.generate.demo_rng` for a pool's.
+        rng: a generator as `demonstrate` was given it; `teasim.generation.demo_rng` for a pool's.
         randomize: as `demonstrate` was told.
     """
     simulation.reset(draw_layout(rng, randomize=randomize))

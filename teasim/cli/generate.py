@@ -14,7 +14,7 @@ from teasim.common.errors import ConfigError
 from teasim.common.parallel import default_jobs
 
 if TYPE_CHECKING:
-    from teasim.generate import GenerateConfig
+    from teasim.generation import GenerateConfig
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Render a pool of tea-making demonstrations, with mistakes in it when asked for."""
     arguments = tyro.cli(GenerateArguments, prog="teasim generate", args=argv)
     pools = _pools(arguments)
-    from teasim.generate import generate
+    from teasim.generation import generate
 
     start = time.perf_counter()
     remade = count = 0
@@ -86,8 +86,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _pools(arguments: GenerateArguments) -> dict[Path, GenerateConfig]:
     """The pools asked for by their folders, all checked before the first one is begun."""
     mistakes = parse_mistakes(arguments.mistakes)
-    from teasim.generate import GenerateConfig
-    from teasim.generate.presets import find_preset
+    from teasim.generation import GenerateConfig
+    from teasim.generation.presets import find_preset
 
     given = {field.name: getattr(arguments, field.name) for field in fields(GenerateConfig)}
     if arguments.preset is None:

@@ -1,6 +1,6 @@
-"""The command `teasim`: finds the verb among the installed entry points and hands over.
+"""The command `teasim`: finds the verb among the installed entry points and calls it.
 
-Every package, ours or another's, adds a verb with one line in its own metadata:
+Any package adds a verb with one line in its own metadata:
 
     [project.entry-points."teasim.verbs"]
     myverb = "my_package.cli:my_verb"
@@ -26,9 +26,9 @@ from teasim.common.errors import Interrupted, TeasimError
 
 GROUP = "teasim.verbs"
 
-EXIT_DONE = 0
-EXIT_BAD_INPUT = 2
-EXIT_INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug of ours, never the user's fault
+EXIT_DONE = 0  # success, as every shell understands it
+EXIT_BAD_INPUT = 2  # what argparse uses for a usage error
+EXIT_INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug in teasim, not the user's fault
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
 EXIT_BROKEN_PIPE = 141  # 128 + SIGPIPE, as a shell reports it
 
@@ -47,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = [argument for argument in given if argument != "--debug"]
     try:
         code = _dispatch(arguments)
-        sys.stdout.flush()  # so that a closed pipe is met here and not at interpreter exit
+        sys.stdout.flush()  # so that a closed pipe is noticed here and not at interpreter exit
     except KeyboardInterrupt as interrupt:
         return _complain(str(interrupt) or NOT_RESUMABLE, EXIT_INTERRUPTED)
     except BrokenPipeError:
@@ -137,7 +137,7 @@ def _summary(point: EntryPoint) -> str:
             if isinstance(node, ast.FunctionDef) and node.name == point.attr
         ]
         return (ast.get_docstring(functions[0]) or "").partition("\n")[0]
-    except Exception:  # a broken plug-in must not take the list of verbs with it
+    except Exception:  # the list must survive a broken plug-in
         return "(this verb's module cannot be read)"
 
 

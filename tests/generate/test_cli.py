@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-import teasim.generate
+import teasim.generation
 from teasim.cli.main import main
 from teasim.common.errors import RenderError
-from teasim.generate import recording
+from teasim.generation import recording
 from teasim.task.mistakes import MISTAKES
 from tests.generate.test_pool import SHORT, digests
 
@@ -76,7 +76,7 @@ def test_an_unfinished_pool_of_other_settings_is_left_alone(tmp_path, capsys, mo
 
 
 def test_a_pool_is_made_and_told_about(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(teasim.generate, "plan_pool", lambda _: SHORT[:1])
+    monkeypatch.setattr(teasim.generation, "plan_pool", lambda _: SHORT[:1])
     pool = tmp_path / "pool"
     assert main(["generate", str(pool), "--size", "64", "--cameras", "cup", "--jobs", "1"]) == 0
     told = capsys.readouterr()
@@ -98,7 +98,7 @@ def test_without_opengl_nothing_is_begun(tmp_path, capsys, monkeypatch):
     def missing():
         raise RenderError("No headless OpenGL back end works.")
 
-    monkeypatch.setattr(teasim.generate, "choose_gl", missing)
+    monkeypatch.setattr(teasim.generation, "choose_gl", missing)
     assert main(["generate", str(tmp_path / "pool"), "--seq1", "1"]) == 2
     assert capsys.readouterr().err == "teasim: No headless OpenGL back end works.\n"
     assert list(tmp_path.iterdir()) == []

@@ -17,7 +17,7 @@ from policies.learners import registry as learners
 from policies.learners.registry import LEARNERS
 from teasim.cli.main import main
 from teasim.common.errors import PoolError
-from teasim.generate import GenerateConfig, plan_pool
+from teasim.generation import GenerateConfig, plan_pool
 from teasim.pool.readers import registry as readers
 from teasim.pool.readers.registry import open_source
 from teasim.task import mistakes
