@@ -18,6 +18,10 @@ SOURCES = [
     for package in PACKAGES
     for path in sorted((ROOT / package).rglob("*.py"))
 ]
+TEXTS = [
+    *("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "pyproject.toml"),
+    *("scripts/setup", "scripts/test", "scripts/demo"),
+]
 LONGEST = 50
 """Most lines of a function: it fits on a screen."""
 MOST_PARAMETERS = 5
@@ -166,7 +170,7 @@ def test_every_field_has_a_line(name):
     assert untold == []
 
 
-@pytest.mark.parametrize("name", [*SOURCES, "README.md", "CONTRIBUTING.md", "pyproject.toml"])
+@pytest.mark.parametrize("name", [*SOURCES, *TEXTS])
 def test_parts_are_called_what_they_are(name):
     lines = (ROOT / name).read_text().splitlines()
     assert [line for line in lines if METAPHORS.search(line)] == []
