@@ -53,8 +53,7 @@ def project_texts() -> list[Path]:
         folders[:] = [f for f in folders if f not in ("out", "dist", "__pycache__")]
         folders[:] = [f for f in folders if not f.startswith(".") or f in (".ci", ".github")]
         kept += [Path(folder, name) for name in names if Path(name).suffix in TEXTS]
-    kept = [path for path in kept if path.name != ".git"]  # a work tree's pointer to its repository
-    return kept
+    return [path for path in kept if path.name != ".git"]  # a work tree points to its repository
 
 
 def test_the_readme_is_short():
