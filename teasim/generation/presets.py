@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from teasim.common.registry import named
-from teasim.generate.config import GenerateConfig
+from teasim.generation.config import GenerateConfig
 
 PRESETS: Mapping[str, Mapping[str, GenerateConfig]] = MappingProxyType(
     {

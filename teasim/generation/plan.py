@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teasim.generate.config import GenerateConfig
+from teasim.generation.config import GenerateConfig
 from teasim.skills.demonstrators import Participant
 from teasim.task.mistakes import Plan, spoil
 from teasim.task.recipes import INCORRECT, LEGAL, OPTIMAL, SEQ_1, SEQ_2, SUBOPTIMAL, random_order
