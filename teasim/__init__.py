@@ -7,9 +7,17 @@ a simulator itself, because a pool can be read without them.
 
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from teasim.generation import generate
+    from teasim.pool import Pool
+
+__all__ = ["Pool", "generate"]
 
 __version__ = "0.1.0"
 

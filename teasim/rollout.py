@@ -115,7 +115,7 @@ def replay(
     Args:
         simulation: The station; it is reset to the layout that `rng` draws.
         targets: The log, column `action` of a pool: angles [rad] and openings [m] (16,) each.
-        rng: The generator of the demonstration, `teasim.generate.demo_rng` for a pool.
+        rng: The generator of the demonstration, `teasim.generation.demo_rng` for a pool.
         randomize: As in `demonstrate`.
     """
     simulation.reset(draw_layout(rng, randomize=randomize))

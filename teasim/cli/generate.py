@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from teasim.common.parallel import default_jobs
-from teasim.generate.config import GenerateConfig
+from teasim.generation.config import GenerateConfig
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Render a pool of tea-making demonstrations, with mistakes in it when asked for."""
     arguments = tyro.cli(GenerateArguments, prog="teasim generate", args=argv)
     pools = _pools(arguments)
-    from teasim.generate.making import generate
+    from teasim.generation.making import generate
 
     jobs = default_jobs() if arguments.jobs is None else arguments.jobs
     start = time.perf_counter()
@@ -53,7 +53,7 @@ def _pools(arguments: GenerateArguments) -> dict[Path, GenerateConfig]:
     """Return the settings of the pools asked for by their folders."""
     if arguments.preset is None:
         return {arguments.pool: arguments.config}
-    from teasim.generate.presets import find_preset
+    from teasim.generation.presets import find_preset
 
     given = arguments.config
     filmed = {name: getattr(given, name) for name in ("cameras", "size", "quality", "look", "seed")}

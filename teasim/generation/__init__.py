@@ -7,10 +7,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from teasim.generate.config import GenerateConfig
-    from teasim.generate.making import Generated, generate
-    from teasim.generate.plan import DemoPlan, plan_pool
-    from teasim.generate.recording import demo_rng
+    from teasim.generation.config import GenerateConfig
+    from teasim.generation.making import Generated, generate
+    from teasim.generation.plan import DemoPlan, plan_pool
+    from teasim.generation.recording import demo_rng
 
 __all__ = ["DemoPlan", "GenerateConfig", "Generated", "demo_rng", "generate", "plan_pool"]
 

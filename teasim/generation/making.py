@@ -5,9 +5,9 @@ from functools import partial
 from pathlib import Path
 
 from teasim.common.parallel import check_workers, run
-from teasim.generate.config import GenerateConfig
-from teasim.generate.plan import plan_pool
-from teasim.generate.recording import generate_demo, pool_header
+from teasim.generation.config import GenerateConfig
+from teasim.generation.plan import plan_pool
+from teasim.generation.recording import generate_demo, pool_header
 from teasim.gl import choose_gl
 from teasim.pool import Pool, claim_folder, episode_is_done, finalize_pool
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from teasim.common.errors import GenerationError, SkillError
 from teasim.constants import FPS, SUBTASKS
-from teasim.generate.config import GenerateConfig
-from teasim.generate.plan import DemoPlan
+from teasim.generation.config import GenerateConfig
+from teasim.generation.plan import DemoPlan
 from teasim.pool import EpisodeRecord, EpisodeWriter, MistakeSpan, PoolHeader, Span
 from teasim.render import StationRenderer
 from teasim.rollout import Step, demonstrate

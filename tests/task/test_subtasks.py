@@ -52,7 +52,7 @@ PROGRAM = """
 import sys
 from pathlib import Path
 import gymnasium
-from teasim.generate import DemoPlan, GenerateConfig, generate, making, plan_pool
+from teasim.generation import DemoPlan, GenerateConfig, generate, making, plan_pool
 from teasim.constants import SUBTASKS
 from teasim.skills.demonstrators import PARTICIPANTS
 from teasim.task.mistakes import Plan

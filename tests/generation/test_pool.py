@@ -9,8 +9,8 @@ import pytest
 
 from teasim.common.errors import GenerationError, PoolError, SkillError
 from teasim.constants import SUBTASKS
-from teasim.generate import DemoPlan, GenerateConfig, generate, making, plan_pool, recording
-from teasim.generate.recording import ATTEMPTS, generate_demo
+from teasim.generation import DemoPlan, GenerateConfig, generate, making, plan_pool, recording
+from teasim.generation.recording import ATTEMPTS, generate_demo
 from teasim.pool import Pool
 from teasim.pool.integrity import check_pool
 from teasim.task.mistakes import Plan, PlannedMistake

@@ -8,9 +8,9 @@ import pytest
 
 from teasim.cli.main import main
 from teasim.common.errors import RenderError
-from teasim.generate import making, recording
+from teasim.generation import making, recording
 from teasim.task.mistakes import MISTAKES
-from tests.generate.test_pool import SHORT, digests
+from tests.generation.test_pool import SHORT, digests
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from teasim.common.errors import ConfigError
 from teasim.constants import FPS, STATE_NAMES, SUBTASKS
-from teasim.generate import DemoPlan, GenerateConfig, plan_pool
-from teasim.generate.config import parse_mistakes
-from teasim.generate.recording import mismatch, pool_header
+from teasim.generation import DemoPlan, GenerateConfig, plan_pool
+from teasim.generation.config import parse_mistakes
+from teasim.generation.recording import mismatch, pool_header
 from teasim.task.mistakes import MISTAKES, Plan, PlannedMistake
 from teasim.task.recipes import CRITICAL, SEQ_1, SEQ_2, is_legal
 from teasim.world.events import Event
