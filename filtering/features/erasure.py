@@ -15,14 +15,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.features.intervals import Activations, Intervals
+from filtering.features.graphs.intervals import Activations, Intervals
 
-Decision = Callable[[Sequence[Intervals]], NDArray[np.float64]]
+DecisionFunction = Callable[[Sequence[Intervals]], NDArray[np.float64]]
 """A classifier: intervals of S clips to logits (S, T)."""
 
 
 def erasure_importance(
-    decide: Decision, clips: Sequence[Intervals], labels: NDArray[np.int64], channels: int
+    decide: DecisionFunction, clips: Sequence[Intervals], labels: NDArray[np.int64], channels: int
 ) -> NDArray[np.float64]:
     """Return (T, N): how much each channel matters to each class; N = `channels`.
 

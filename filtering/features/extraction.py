@@ -1,4 +1,4 @@
-"""Frames of a video to one feature vector per segment."""
+"""Frames of segments to pooled features, or to feature maps (paper section 3.2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +13,9 @@ from filtering.vision.frame_features import clip_key, look_up_or_describe, side_
 from filtering.vision.frames import Frames, fit_size, segment_indices, uniform_indices
 from teasim.pool import Span
 from teasim.pool.source import Clip, Source
+
+Maps = NDArray[np.float16]
+"""Stride-16 feature maps of frames; half precision halves their memory.  # (n, C, h, w)"""
 
 OVERVIEW = 31
 """Frames spread over the whole video from which its background is learnt."""
@@ -89,6 +92,34 @@ def foreground(clip: Clip, indices: NDArray[np.int64], background: str) -> Frame
     return subtraction_named(background)(
         frames[np.searchsorted(wanted, indices)], frames[np.searchsorted(wanted, overview)]
     )
+
+
+def segment_maps(clip: Clip, spans: tuple[Span, ...], count: int, background: str) -> list[Maps]:
+    """Return per segment the feature maps (n, C, h, w) of at most `count` of its frames.
+
+    Raises:
+        ConfigError: there is no such background subtraction.
+        PoolError: the video is missing or damaged.
+    """
+    indices = segment_indices(spans, count)
+    used = np.unique(np.concatenate(indices))
+    maps = frame_maps(foreground(clip, used, background))
+    return [maps[np.searchsorted(used, chosen)] for chosen in indices]
+
+
+def frame_maps(frames: Frames) -> Maps:
+    """Return the stride-16 feature maps (n, C, h, w) of frames (n, H, W, 3)."""
+    import torch
+
+    from filtering.vision.backbone import BATCH, feature_maps
+    from filtering.vision.determinism import one_thread
+
+    with one_thread(), torch.inference_mode():
+        parts = [
+            feature_maps(frames[first : first + BATCH])[0].numpy().astype(np.float16)
+            for first in range(0, len(frames), BATCH)
+        ]
+    return np.concatenate(parts)
 
 
 def pool_over_time(task: VideoTask, frames: NDArray[np.float32]) -> NDArray[np.float32]:

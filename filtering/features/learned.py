@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import BottleneckConfig, GeneratorConfig
+from filtering.features.extraction import segment_maps
 from filtering.features.generator import FeatureGenerator
-from filtering.features.maps import segment_maps
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
 from teasim.pool import Span
@@ -95,16 +95,26 @@ def learn_features(
 
 @dataclass(frozen=True)
 class _MapsTask:
+    """The feature maps of one video."""
+
     clip: Clip
+    """The video."""
     spans: tuple[Span, ...]
+    """Its segments [frames]."""
     look: LookConfig
+    """Frames that are used."""
 
 
 @dataclass(frozen=True)
 class _Task:
+    """The features of one video."""
+
     clip: Clip
+    """The video."""
     spans: tuple[Span, ...]
+    """Its segments [frames]."""
     learned: LearnedFeatures
+    """How they are described."""
 
 
 def _maps(task: _MapsTask) -> list[NDArray[np.float16]]:

@@ -55,8 +55,8 @@ def marks_of(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
 
 
 def _mark(finding: Finding, clock: Clock) -> Mark:
-    if finding.idle is not None:
-        text = f"nothing came of {finding.idle.subtask}"
+    if finding.ineffective is not None:
+        text = f"{finding.ineffective.subtask} was ineffective"
     elif finding.expected is None:
         text = "the end was expected"
     else:

@@ -89,14 +89,13 @@ def edit_score(pair: LabelPair) -> float:
 
 def levenshtein(first: Sequence[int], second: Sequence[int]) -> int:
     """Return the fewest insertions, deletions and replacements that turn one into the other."""
-    row = list(range(len(second) + 1))
-    for i, label in enumerate(first, start=1):
-        diagonal, row[0] = row[0], i
-        for j, other in enumerate(second, start=1):
-            replaced = diagonal + (label != other)
-            diagonal = row[j]
-            row[j] = min(replaced, row[j] + 1, row[j - 1] + 1)
-    return row[-1]
+    row = np.arange(len(second) + 1)
+    labels, columns = np.array(second), np.arange(len(second) + 1)
+    for number, label in enumerate(first, start=1):
+        changed = np.append(number, np.minimum(row[1:] + 1, row[:-1] + (labels != label)))
+        # An insertion adds 1 to the left neighbour: a running minimum of what exceeds the column.
+        row = np.minimum.accumulate(changed - columns) + columns
+    return int(row[-1])
 
 
 def f1_score(pairs: Sequence[LabelPair], overlap: int) -> float:

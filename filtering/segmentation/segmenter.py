@@ -111,6 +111,6 @@ def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = 
             "that `teasim segment fit` made."
         )
     # Only here: logged labels need no torch.
-    from filtering.segmentation.mstcn_checkpoint import load_segmenter
+    from filtering.segmentation.mstcn.checkpoint import load_segmenter
 
     return load_segmenter(Path(name)).segment

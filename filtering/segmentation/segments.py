@@ -33,8 +33,7 @@ class Segmentation:
 
     def labels(self) -> list[list[int]]:
         """Return per demonstration the label numbers of its segments, 0..T-1."""
-        numbers = {name: number for number, name in enumerate(self.subtasks)}
-        return [[numbers[span.subtask] for span in spans] for spans in self.spans]
+        return label_numbers(self.spans, self.subtasks)
 
     def confidence(self) -> float | None:
         """Return the mean probability of the most probable label of a frame, over all frames.
@@ -44,6 +43,17 @@ class Segmentation:
         if self.posteriors is None:
             return None
         return float(np.concatenate([video.max(axis=1) for video in self.posteriors]).mean())
+
+
+def label_numbers(spans: Sequence[tuple[Span, ...]], subtasks: tuple[str, ...]) -> list[list[int]]:
+    """Return per demonstration the label numbers of its segments, 0..T-1.
+
+    Args:
+        spans: per demonstration its q segments.
+        subtasks: names of the T labels.
+    """
+    numbers = {name: number for number, name in enumerate(subtasks)}
+    return [[numbers[span.subtask] for span in demo] for demo in spans]
 
 
 class Segmenter(Protocol):

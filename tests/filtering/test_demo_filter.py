@@ -7,7 +7,7 @@ import pytest
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from filtering.judging.verdict import JUDGES
+from filtering.judging.judges import JUDGES
 from filtering.segmentation.segmenter import segmenter_named
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool

@@ -7,14 +7,14 @@ import pytest
 import torch
 from torch.nn import functional
 
-from filtering.segmentation.mstcn import (
+from filtering.segmentation.mstcn.network import (
     MSTCN,
     DilatedResidualLayer,
     DualDilatedLayer,
     MSTCNShape,
     mstcn_loss,
 )
-from filtering.segmentation.mstcn_training import (
+from filtering.segmentation.mstcn.training import (
     LabelledVideo,
     MSTCNConfig,
     MSTCNLearner,

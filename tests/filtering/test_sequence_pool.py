@@ -10,9 +10,9 @@ import pytest
 from filtering.cli import main
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
+from filtering.judging.judges import JUDGES
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import count_steps, steps_of_frames
-from filtering.judging.verdict import JUDGES
 from filtering.output import FILES
 from filtering.segmentation.segmenter import segmenter_named
 from teasim.common.errors import ConfigError, PoolError
