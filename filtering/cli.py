@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,7 +39,7 @@ class FilterCommand:
     groundTruth/*.txt or predictions/*.txt, and mapping.txt) without videos."""
     out: Out
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
-    config: Annotated[FilterConfig, tyro.conf.OmitArgPrefixes] = field(default_factory=FilterConfig)
+    config: Annotated[FilterConfig, tyro.conf.OmitArgPrefixes]
     """Settings of the filter."""
     fps: float | None = None
     """Frames (lines) per second of an MS-TCN folder; without it, times are given in frames."""
@@ -64,7 +64,7 @@ class FitCommand:
     """The pool, with labelled sub-tasks."""
     out: Out
     """New folder for the segmenter."""
-    config: Annotated[FitConfig, tyro.conf.OmitArgPrefixes] = field(default_factory=FitConfig)
+    config: Annotated[FitConfig, tyro.conf.OmitArgPrefixes]
     """Settings of the fit."""
     jobs: int | None = None
     """Number of worker processes; by default one per core."""

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
+import hypothesis
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filtering.config import FilterConfig
@@ -24,19 +24,15 @@ from teasim.pool import Span
 NAMES = ("a", "b", "c", "d")
 
 
-def evidence(ineffective: list[list[float]] | None, demos: int = 8) -> Evidence:
+def evidence(nats: list[list[float]] | None, demos: int = 8) -> Evidence:
     """`demos` times a, b, c, d, ten frames each, with these surprises."""
     spans = tuple(Span(name, 10 * n, 10 * n + 10) for n, name in enumerate(NAMES))
     known = Evidence(NAMES, (spans,) * demos)
-    return (
-        known
-        if ineffective is None
-        else replace(known, ineffective=[np.array(nats) for nats in ineffective])
-    )
+    return known if nats is None else replace(known, ineffective=[*map(np.array, nats)])
 
 
-def judged(ineffective: list[list[float]] | None) -> Judgement:
-    return by_norm(evidence(ineffective), FilterConfig())
+def judged(nats: list[list[float]] | None) -> Judgement:
+    return by_norm(evidence(nats), FilterConfig())
 
 
 def test_an_ineffective_step_is_flagged_with_its_time_in_the_video() -> None:
@@ -52,9 +48,8 @@ def test_what_is_left_out_as_well_is_told_too() -> None:
     spans[-1] = spans[-1][:3]
     ineffective = [np.zeros(len(demo)) for demo in spans]
     ineffective[-1][0] = 99.0
-    found = by_norm(
-        Evidence(NAMES, tuple(spans), ineffective=ineffective), FilterConfig()
-    ).findings[-1]
+    known = Evidence(NAMES, tuple(spans), ineffective=ineffective)
+    found = by_norm(known, FilterConfig()).findings[-1]
     assert {item.expected for item in found if item.missing} == {"d"}
     assert [item.ineffective.subtask for item in found if item.ineffective] == ["a"]
 
@@ -63,21 +58,19 @@ def test_where_nobody_looked_nothing_changes() -> None:
     assert judged(None).losses.tolist() == judged([[0.0] * 4] * 8).losses.tolist()
 
 
-@given(
+@hypothesis.given(
     st.lists(
         st.lists(st.floats(0, 30), min_size=4, max_size=4),
         min_size=8,
         max_size=8,
     )
 )
-@settings(max_examples=30, deadline=None)
-def test_an_ineffective_step_is_never_worse_than_one_left_out(
-    ineffective: list[list[float]],
-) -> None:
-    known = evidence(ineffective)
+@hypothesis.settings(max_examples=30, deadline=None)
+def test_an_ineffective_step_is_never_worse_than_one_left_out(given: list[list[float]]) -> None:
+    known = evidence(given)
     found = score_steps(known.counts)
     for nats, usual, given_nats in zip(
-        ineffective_losses(found, known), found.usual, ineffective, strict=True
+        ineffective_losses(found, known), found.usual, given, strict=True
     ):
         assert (nats <= usual + 1e-12).all()
         assert (nats >= 0).all()
