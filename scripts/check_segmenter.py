@@ -28,8 +28,11 @@ class Part:
     """Some demonstrations of a pool."""
 
     name: str
+    """Name in the table."""
     pool: Pool
+    """Pool that they belong to."""
     episodes: tuple[Episode, ...]
+    """The demonstrations."""
 
 
 def part(text: str) -> Part:

@@ -1,4 +1,4 @@
-"""How good a segmentation is: the published measures of action segmentation, and the paper's.
+"""Measures of a segmentation: those of the literature on action segmentation, and the paper's.
 
 Frame accuracy, edit score and F1@k (Lea et al., ECCV 2016 and CVPR 2017) are computed over a set of
 videos as the evaluation program of MS-TCN does it: accuracy over all frames, F1 from hits counted
@@ -27,7 +27,7 @@ Labels = NDArray[np.integer]
 
 @dataclass(frozen=True)
 class LabelPair:
-    """What a video shows and what a segmenter says."""
+    """True and predicted labels of a video."""
 
     truth: Labels
     """(n,) true label of each frame."""

@@ -1,4 +1,4 @@
-"""What a segmenter returns, and how frame posteriors become segments."""
+"""The result of a segmenter, and the decoding of frame posteriors to segments."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ class Segmentation:
     spans: tuple[tuple[Span, ...], ...]
     """Per demonstration its q segments in order of time [frames]."""
     posteriors: tuple[NDArray[np.float32], ...] | None = None
-    """Per demonstration (frames, T): probability of each sub-task in each frame; what a row lacks
-    to 1 is the probability of none of them. None where segments were given, not inferred."""
+    """Per demonstration (frames, T): probability of each sub-task in each frame; 1 minus the sum of
+    a row is the probability of no sub-task. None where segments were given, not inferred."""
     labelled: frozenset[str] = frozenset()
     """demo_id of the demonstrations whose true labels the segmenter was fitted to."""
     weights_sha256: str | None = None
-    """Which segmenter inferred them; None where segments were given."""
+    """Hash of the weights of the segmenter; None where segments were given."""
 
     def labels(self) -> list[list[int]]:
         """Return per demonstration the label numbers of its segments, 0..T-1."""

@@ -137,7 +137,7 @@ def test_only_clustering_takes_a_number():
         with pytest.raises(ConfigError) as caught:
             FilterConfig(segmenter=name, subtasks="7")
         assert str(caught.value) == (
-            f"The segmenter '{name}' knows its sub-tasks; a number of them is for 'clustering'."
+            f"The segmenter '{name}' takes no number of sub-tasks; only 'clustering' does."
         )
 
 
