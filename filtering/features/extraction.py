@@ -18,19 +18,19 @@ Maps = NDArray[np.float16]
 """Stride-16 feature maps of frames; half precision halves their memory.  # (n, C, h, w)"""
 
 OVERVIEW = 31
-"""Frames spread over the whole video from which its background is learnt."""
+"""Number of frames over the whole video from which its background is estimated."""
 
 
 @dataclass(frozen=True)
 class VideoTask:
-    """One video to describe; small, so that it travels to a worker process."""
+    """One video to describe; small, because it is sent to a worker process."""
 
     clip: Clip
     """Where the frames are."""
     spans: tuple[Span, ...]
     """The segments [frames]."""
     frames_per_segment: int
-    """Most frames looked at in a segment."""
+    """Largest number of frames used per segment."""
     background: str
     """Name of the background subtraction."""
     cache_folder: Path
@@ -46,13 +46,13 @@ def segment_features(
     background: str,
     jobs: int,
 ) -> list[NDArray[np.float32]]:
-    """Return per demonstration (q, F): what each of its segments looks like.
+    """Return per demonstration features (q, F) of its segments.
 
     Args:
         pool: where the videos are.
         segments: the segments of each demonstration.
-        cameras: whose pictures to use; their features are put side by side.
-        frames_per_segment: most frames looked at in a segment.
+        cameras: cameras to use; their features are concatenated.
+        frames_per_segment: largest number of frames used per segment.
         background: name of the background subtraction.
         jobs: worker processes; the result does not depend on it.
 
@@ -133,7 +133,7 @@ def pool_over_time(task: VideoTask, frames: NDArray[np.float32]) -> NDArray[np.f
 
 
 def _frames_of(task: VideoTask) -> NDArray[np.int64]:
-    """Return the frames that are looked at, each once and in order."""
+    """Return the frames that are used, each once and in order."""
     return np.unique(np.concatenate(segment_indices(task.spans, task.frames_per_segment)))
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class FeatureGenerator:
-    """Finds the channels that tell sub-tasks apart by their intervals, and keeps these.
+    """Selects the channels whose intervals discriminate between sub-tasks.
 
     After `fit`:
         thresholds_ (N,): activation above which a channel is active.

@@ -47,7 +47,7 @@ def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
 
 
 def marks_of(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
-    """Mark what is missing and the largest other findings; smaller ones mostly follow from those."""
+    """Mark what is missing and the largest other findings; smaller ones follow from those."""
     if not findings:
         return ()
     grave = gravest(findings)

@@ -56,8 +56,8 @@ def clustering(
     longest = max(map(len, videos))
     if subtasks is not None and subtasks > longest:
         raise ConfigError(
-            f"{subtasks} sub-tasks were asked for, but only {longest} frames are used of the longest "
-            f"video of the pool '{pool.root}'; choose fewer."
+            f"{subtasks} sub-tasks were asked for, but the longest video of the pool "
+            f"'{pool.root}' gives only {longest} frames to compare; choose fewer."
         )
     with threadpool_limits(limits=1, user_api="blas"):  # sums get one order
         found = discover(videos, subtasks)

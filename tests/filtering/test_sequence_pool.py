@@ -125,15 +125,15 @@ def test_every_score_judges_step_lists(folder: Path, name: str) -> None:
     [
         (
             ["--camera", "left"],
-            "'{folder}' has no pictures, which cameras is about; leave it out.",
+            "'{folder}' has no pictures, which cameras needs; leave it out.",
         ),
         (
             ["--background", "mog2"],
-            "'{folder}' has no pictures, which background is about; leave it out.",
+            "'{folder}' has no pictures, which background needs; leave it out.",
         ),
         (
             ["--frames-per-segment", "8"],
-            "'{folder}' has no pictures, which frames_per_segment is about; leave it out.",
+            "'{folder}' has no pictures, which frames_per_segment needs; leave it out.",
         ),
         (["--fps", "0"], "fps is 0.0; choose a number above 0."),
     ],
