@@ -56,11 +56,12 @@ class DemoFilter:
     Ten step lists, of which the last one lacks a step:
 
         >>> import tempfile
+        >>> from pathlib import Path
         >>> import numpy as np
         >>> from filtering import DemoFilter, FilterConfig
         >>> from teasim.pool.mstcn import write_predictions
         >>> from teasim.pool.readers.registry import open_source
-        >>> folder = tempfile.mkdtemp()
+        >>> folder = Path(tempfile.mkdtemp())
         >>> usual, short = np.repeat([0, 1, 2], 5), np.repeat([0, 2], 5)
         >>> videos = {f"video_{n}": usual for n in range(9)} | {"video_9": short}
         >>> write_predictions(folder, ("boil", "pour", "stir"), videos, {}, {})
@@ -174,7 +175,7 @@ from the whole video.
         for name in ABOUT_PICTURES:
             if getattr(self.config, name) != usual[name]:
                 raise ConfigError(
-                    f"'{pool.root}' has no pictures, which {name} needs; leave it out."
+                    f"'{pool.root}' has no pictures; leave out {name}, which needs them."
                 )
         return ()
 

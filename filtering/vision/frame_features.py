@@ -77,7 +77,7 @@ def sample_count(length: int, fps: float, rate: float) -> int:
 
 
 def sampled_frames(length: int, count: int) -> NDArray[np.int64]:
-    """Return the numbers (count,) of the sampled frames: the middles of equal parts of the video."""
+    """Return the numbers (count,) of the sampled frames: middles of equal parts of the video."""
     return uniform_indices(0, length, count)
 
 
