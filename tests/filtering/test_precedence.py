@@ -135,7 +135,8 @@ def test_impossible_graphs_are_refused(pairs, message: str) -> None:
         ),
         (
             {"threshold": "luck"},
-            "Unknown threshold 'luck'; choose auto, kmeans, gmm, minibatch.",
+            "Unknown threshold 'luck'; choose a number between 0 and 1, auto, kmeans, gmm, "
+            "minibatch.",
         ),
     ],
 )
