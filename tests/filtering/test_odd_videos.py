@@ -9,8 +9,9 @@ import pytest
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from filtering.segmentation.fitting import FitConfig, fit_segmenter
-from filtering.segmentation.mstcn_training import MSTCNConfig
+from filtering.segmentation.config import FitConfig
+from filtering.segmentation.fit import fit_segmenter
+from filtering.segmentation.mstcn.training import MSTCNConfig
 from teasim.pool import Pool
 from tests import toy_pool
 from tests.toy_pool import SEQ_1, make_toy_pool
