@@ -1,7 +1,6 @@
 """Altered views: bounded, repeatable, and the frame itself always first."""
 
 import numpy as np
-
 from policies.data.augmentation import LIGHT, NOISE, SHIFT, views
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from policies.play.captions import STRIP, caption
 
 from policies.data.samples import ObservationSpec
-from policies.play.captions import STRIP, caption
 from policies.play.evaluation import MODES, EvaluationConfig, evaluate, score
 from policies.play.rollout import EnvironmentConfig, Episode, make_environment, run_episode
 from teasim.common.errors import CheckpointError, ConfigError

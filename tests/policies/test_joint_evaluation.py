@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from policies.play.joint_results import mean_done, motion_summary
 
 from policies.checkpoint import load_policy
 from policies.cli import evaluate, train
 from policies.data.samples import ObservationSpec
 from policies.play.evaluation import EvaluationConfig
 from policies.play.joint_evaluation import evaluate_motion, score_motion
-from policies.play.joint_results import mean_done, motion_summary
 from policies.play.joint_rollout import JOINT_ENVIRONMENT, PATIENCE, MotionEpisode, run_motion
 from policies.play.rollout import make_environment
 from teasim.common.errors import CheckpointError, ConfigError
