@@ -53,7 +53,7 @@ class LearnerKind:
     levels: tuple[str, ...]
     """Levels at which it learns: `subtask` (the next sub-task), `joint` (the joint targets)."""
     needs: tuple[str, ...] = ()
-    """What it needs besides weighted samples: `experts` (`config` then has a field `experts`, places
+    """Needs besides weighted samples: `experts` (`config` then has a field `experts`: places
     in the pool of demonstrations known to be good), `log` (a joint log in the pool)."""
 
     @property

@@ -1,7 +1,8 @@
 """Altered views: bounded, repeatable, and the frame itself always first."""
 
 import numpy as np
-from policies.data.augmentation import LIGHT, NOISE, SHIFT, views
+
+from policies.data.features import LIGHT, NOISE, SHIFT, views
 
 
 def test_the_first_view_is_the_frame_itself():

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from policies.learners.chunks import EARLIER, LATER
 
+from policies.learners.store import EARLIER, LATER
 from tests.policies.learning import make
 
 
