@@ -62,14 +62,14 @@ def worlds(config: EnvironmentConfig, *, filmed: bool = False) -> Iterator[World
 def violation_words(env: gym.Env[Any, Any]) -> Mapping[str, str]:
     """Words for the violations that `env` can report: key of `info["violations"]` -> words.
 
-    Keys with the same words are one kind of violation and are counted together. An environment
-    names them by an attribute `violation_kinds` (words -> keys) or `violation_names` (key ->
-    words); for one that names none the mapping is empty.
+    Keys with the same words are one kind of violation and are counted together. The metadata of an
+    environment name them: `violation_kinds` (words -> keys that are counted together), or
+    `violations` (key -> words). For an environment that names none the mapping is empty.
     """
-    kinds = getattr(env.unwrapped, "violation_kinds", None)
-    if kinds:
-        return {key: words for words, keys in kinds.items() for key in keys}
-    return dict(getattr(env.unwrapped, "violation_names", {}))
+    metadata = env.unwrapped.metadata
+    if "violation_kinds" in metadata:
+        return {key: words for words, keys in metadata["violation_kinds"].items() for key in keys}
+    return dict(metadata.get("violations", {}))
 
 
 def reported(env: gym.Env[Any, Any], seed: int, info: Mapping[str, Any]) -> dict[str, Any]:

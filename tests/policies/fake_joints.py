@@ -22,7 +22,7 @@ FAKE_JOINTS = EnvironmentConfig(FAKE_JOINTS_ID, max_actions=None)
 class FakeJoints(gym.Env[dict[str, Any], Any]):
     """Joints go where they are told; the next sub-task of Seq_1 is done where its place is."""
 
-    violation_kinds = KINDS
+    metadata = {"render_modes": [], "violation_kinds": KINDS}  # noqa: RUF012
 
     def __init__(
         self, obs_type: str = "state", quality: str = "fast", randomize: bool = True

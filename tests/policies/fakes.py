@@ -44,8 +44,7 @@ def flags(done: set[int]) -> NDArray[np.float32]:
 class FakeTea(gym.Env[dict[str, Any], int]):
     """The sub-task environment without physics: every allowed action works, others do nothing."""
 
-    violation_kinds = KINDS
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 1, "violation_kinds": KINDS}  # noqa: RUF012
 
     def __init__(
         self,

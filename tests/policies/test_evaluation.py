@@ -139,7 +139,7 @@ class Reports(gym.Env):
     """An environment of which only what it says at the end matters."""
 
     def __init__(self, **named):
-        vars(self).update(named)
+        self.metadata = {"render_modes": [], **named}
 
 
 def kinds_of(env, violations, *, unsafe=False):
@@ -157,4 +157,4 @@ def test_keys_of_one_kind_are_counted_together_and_a_kind_that_did_not_occur_is_
 
 def test_a_violation_without_words_is_listed_by_its_key():
     assert kinds_of(Reports(), ("too_fast",), unsafe=True) == {"too fast": True, "unsafe": True}
-    assert kinds_of(Reports(violation_names={"x": "broken cup"}), ()) == {"broken cup": False}
+    assert kinds_of(Reports(violations={"x": "broken cup"}), ()) == {"broken cup": False}

@@ -92,7 +92,7 @@ def test_scenes_not_played_for_long_are_forgotten(monkeypatch):
 
 @pytest.mark.parametrize("given", [{}, {"seed": 0, "options": {"randomize": False}}])
 def test_a_scene_that_its_seed_does_not_tell_is_refused(given):
-    with pytest.raises(ValueError, match="give one and no options"):
+    with pytest.raises(ValueError, match="give one, and no options"):
         Remembering(GoingBack()).reset(**given)
 
 
