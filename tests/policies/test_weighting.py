@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from policies.data.weighting import demo_weights, weighted_moments
+from policies.data.moments import weighted_moments
+from policies.data.weighting import demo_weights
 from teasim.common.errors import ConfigError
 from teasim.pool.weight_table import WeightRow, write_weight_table
 
