@@ -183,7 +183,8 @@ def _notes(meta: Metadata, episodes: Sequence[Episode]) -> Iterator[str]:
     for name, where in missing.items():
         yield (
             f"'{name}' has values that are missing, not finite or of another size in "
-            f"{len(where)} demonstrations, the first is demonstration {min(where)}; it cannot be learned from."
+            f"{len(where)} demonstrations, the first is demonstration {min(where)}; it cannot be "
+            "learned from."
         )
 
 
