@@ -207,6 +207,9 @@ def _video_stream(path: Path, container: Any) -> Any:
         container.close()
         raise PoolError(f"The file '{path}' holds no video.")
     stream = container.streams.video[0]
+    if stream.codec_context is None:  # the file names a codec that does not exist
+        container.close()
+        raise damaged(path)
     width, height = stream.codec_context.width, stream.codec_context.height
     if max(width, height) > MAX_SIDE:
         container.close()

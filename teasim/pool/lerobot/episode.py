@@ -20,7 +20,7 @@ from teasim.pool.lerobot.labels import annotated_spans, said, said_spans
 from teasim.pool.lerobot.log import Rows, rows_of
 from teasim.pool.lerobot.metadata import Metadata
 from teasim.pool.source import Clip
-from teasim.pool.types import GroundTruth, MistakeSpan, Span, spans_from_index
+from teasim.pool.types import NO_SUBTASK, GroundTruth, MistakeSpan, Span, spans_from_index
 
 NOT_NUMBERS = ("video", "image", "string", "language")
 """Kinds of features that are no numbers."""
@@ -183,6 +183,25 @@ class Episode:
         if not self._labelling.is_numbered:
             return ()
         return spans_from_index(self.column(layout.SUBTASK_INDEX), self._labelling.names)
+
+    def check_labels(self) -> Iterator[str]:
+        """Yield a sentence for each label that is damaged.
+
+        Raises:
+            PoolError: The labels are not readable.
+        """
+        self.spans()
+        record, listed = self.record, self._labelling.listed
+        if record is not None and any(m.stop > self.length for m in record.mistakes):
+            yield f"A mistake lies outside demonstration {self.index}."
+        if not listed or not self._labelling.is_numbered:
+            return
+        index = whole_numbers(self._part(layout.SUBTASK_INDEX), layout.SUBTASK_INDEX)
+        if ((index < NO_SUBTASK) | (index >= len(listed))).any():
+            yield (
+                f"There is a sub-task number without a name in the log '{self.data_path}' of "
+                f"demonstration {self.index}."
+            )
 
     def predicted_spans(self) -> tuple[Span, ...]:
         """Return nothing: a pool stores no predictions."""

@@ -56,19 +56,25 @@ class Labelling:
         Raises:
             PoolError: The labels are damaged.
         """
-        logged = tuple(map(str, self._meta.manifest.get("subtasks", ())))
-        if logged:
-            return logged
-        path = self._meta.root / layout.SUBTASKS
-        listed = in_order(names_by_number(path, layout.SUBTASK_INDEX), "subtask")
-        annotated = self._annotated_names
-        if listed and self.is_numbered and set(annotated) <= set(listed):
-            return listed
-        if annotated:
-            return annotated
-        if self._said_names or not self.is_numbered:
-            return self._said_names or listed
+        if self._meta.manifest.get("subtasks"):
+            return self.listed
+        used = self._annotated_names or self._said_names
+        if self.listed and set(used) <= set(self.listed):
+            return self.listed
+        if used or not self.is_numbered:
+            return used
         return in_order({}, "subtask", self._highest_number() + 1)
+
+    @cached_property
+    def listed(self) -> tuple[str, ...]:
+        """The list of names in the manifest, else in subtasks.parquet; empty without one.
+
+        Raises:
+            PoolError: The list is damaged.
+        """
+        logged = tuple(map(str, self._meta.manifest.get("subtasks", ())))
+        path = self._meta.root / layout.SUBTASKS
+        return logged or in_order(names_by_number(path, layout.SUBTASK_INDEX), "subtask")
 
     @property
     def _annotated_names(self) -> tuple[str, ...]:

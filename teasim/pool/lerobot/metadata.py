@@ -118,7 +118,12 @@ def read_metadata(root: Path) -> Metadata:
     ]
     lines = str(info["codebase_version"]).startswith("v2.")
     episodes = read_json_episodes(root) if lines else read_parquet_episodes(root, keys)
-    return Metadata(root, info, _read_manifest(root), episodes)
+    meta = Metadata(root, info, _read_manifest(root), episodes)
+    first = episodes.row(0)
+    meta.data_path(first)  # a template that is no path is told when the pool is opened
+    for key in keys:
+        meta.video_path(first, key)
+    return meta
 
 
 def metadata_notes(meta: Metadata) -> list[str]:

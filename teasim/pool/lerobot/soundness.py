@@ -123,12 +123,9 @@ def _numeric(meta: Metadata) -> tuple[str, ...]:
 
 
 def _check_labels(meta: Metadata, episode: Episode) -> Iterator[str]:
-    episode.spans()
+    yield from episode.check_labels()
     if not meta.manifest.get("sha256"):  # else the check sums tell
         yield from episode.check_identity()
-    record = episode.record
-    if record is not None and any(m.stop > episode.length for m in record.mistakes):
-        yield f"A mistake lies outside demonstration {episode.index}."
 
 
 def _check_videos(meta: Metadata, episode: Episode) -> Iterator[str]:
