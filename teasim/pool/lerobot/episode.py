@@ -14,7 +14,7 @@ from teasim.pool.clips import VideoClip
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, numbers, read_column, whole_numbers
 from teasim.pool.lerobot.identity import demo_id, halves, identifying_log
-from teasim.pool.lerobot.images import StoredImages
+from teasim.pool.lerobot.images import image_clip
 from teasim.pool.lerobot.labelling import Labelling
 from teasim.pool.lerobot.labels import annotated_spans, said, said_spans
 from teasim.pool.lerobot.log import Rows, rows_of
@@ -215,6 +215,16 @@ class Episode:
         """The parquet file that holds the demonstration's log."""
         return self._meta.data_path(self.row)
 
+    def video_files(self) -> dict[str, Path]:
+        """Return the video of each feature, depth cameras included, by its key.
+
+        Raises:
+            PoolError: A path leads out of the data set.
+        """
+        kinds = self._meta.features.items()
+        keys = [key for key, spec in kinds if spec["dtype"] == "video"]
+        return {key: self._meta.video_path(self.row, key) for key in keys}
+
     def column(self, name: str) -> np.ndarray:
         """A per-frame column, e.g. observation.state.
 
@@ -246,7 +256,7 @@ class Episode:
             raise PoolError(f"The pool has no camera '{camera}'; it has {choices}.")
         key, rows = self._meta.cameras[camera], self._rows()
         if key not in self._meta.videos:
-            return StoredImages(rows.path, key, self.index, self.length)
+            return image_clip(rows, key)
         fps = float(self._meta.fps)
         begin = float(self.row.get(f"videos/{key}/from_timestamp", 0.0))
         path = self._meta.video_path(self.row, key)

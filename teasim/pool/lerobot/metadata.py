@@ -48,6 +48,11 @@ class Metadata:
         features: Mapping[str, Any] = self.info["features"]
         return features
 
+    @property
+    def has_lines(self) -> bool:
+        """Whether the demonstrations are listed in JSON lines and have files of their own."""
+        return _has_lines(self.info)
+
     @cached_property
     def cameras(self) -> dict[str, str]:
         """Feature key of each camera by its short name."""
@@ -116,8 +121,7 @@ def read_metadata(root: Path) -> Metadata:
     keys = [
         k for k in camera_keys(info["features"]).values() if info["features"][k]["dtype"] == "video"
     ]
-    lines = str(info["codebase_version"]).startswith("v2.")
-    episodes = read_json_episodes(root) if lines else read_parquet_episodes(root, keys)
+    episodes = read_json_episodes(root) if _has_lines(info) else read_parquet_episodes(root, keys)
     meta = Metadata(root, info, _read_manifest(root), episodes)
     first = episodes.row(0)
     meta.data_path(first)  # a template that is no path is told when the pool is opened
@@ -188,6 +192,10 @@ def _read_info(root: Path) -> Mapping[str, Any]:
         raise PoolError(f"The file '{path}' is damaged: 'features' is not readable.")
     _check_paths(path, info)
     return info
+
+
+def _has_lines(info: Mapping[str, Any]) -> bool:
+    return str(info["codebase_version"]).startswith("v2.")
 
 
 def _check_paths(path: Path, info: Mapping[str, Any]) -> None:

@@ -40,6 +40,11 @@ class Pool:
         return f"Pool('{self.root}', {len(self.episodes)} demonstrations)"
 
     @property
+    def metadata(self) -> Metadata:
+        """What info.json, the manifest and the episodes table say."""
+        return self._meta
+
+    @property
     def root(self) -> Path:
         """Folder of the pool."""
         return self._meta.root

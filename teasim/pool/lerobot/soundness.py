@@ -7,6 +7,7 @@ nothing and is printed as a warning.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -48,7 +49,7 @@ class Findings:
 
 def look_at(meta: Metadata, episodes: Sequence[Episode]) -> Findings:
     """Hold metadata, logs and videos against each other."""
-    problems = [Problem(text) for text in _rewritten(meta)]
+    problems = list(_rewritten(meta, episodes))
     for episode in episodes:
         for check in (_check_log, _check_labels, _check_videos):
             found = sentences(partial(check, meta, episode))
@@ -65,8 +66,20 @@ def sentences(check: Callable[[], Iterator[str]]) -> Iterator[str]:
         yield str(error)
 
 
-def _rewritten(meta: Metadata) -> Iterator[str]:
-    """Are the files the ones that were written?"""
+def _rewritten(meta: Metadata, episodes: Sequence[Episode]) -> Iterator[Problem]:
+    """Are the files the ones that were written? A file counts for the demonstrations in it."""
+    changed = dict(_changed_files(meta))
+    if not changed:
+        return
+    used = set()
+    for episode in episodes:
+        files = {episode.data_path, *episode.video_files().values()}
+        yield from (Problem(changed[path], episode.index) for path in changed if path in files)
+        used |= files
+    yield from (Problem(text) for path, text in changed.items() if path not in used)
+
+
+def _changed_files(meta: Metadata) -> Iterator[tuple[Path, str]]:
     stale = bool(list(_other_writer(meta)))
     for name, told in meta.manifest.get("sha256", {}).items():
         parts = [*name.split("/"), ""]
@@ -75,12 +88,15 @@ def _rewritten(meta: Metadata) -> Iterator[str]:
         try:
             path = inside(meta.root, name)
         except PoolError as error:
-            yield str(error)
+            yield meta.root / name, str(error)
             continue
         if not path.is_file():
-            yield f"The file '{path}' is missing."
+            yield path, f"The file '{path}' is missing."
         elif sha256_of(path) != told:
-            yield f"The file '{path}' is damaged: its check sum is not the one of the manifest."
+            yield (
+                path,
+                f"The file '{path}' is damaged: its check sum is not the one of the manifest.",
+            )
 
 
 def _other_writer(meta: Metadata) -> Iterator[str]:
