@@ -106,7 +106,8 @@ def as_numpy(column: pa.ChunkedArray, name: str = "column") -> np.ndarray:
     if len(lengths) > 1:
         raise PoolError(f"The vectors of column '{name}' differ in length.")
     values = as_numpy(pa.chunked_array([flat]), name)
-    return values.reshape(len(array), *values.shape[1:], -1) if len(array) else values
+    width = int(lengths[0]) if len(array) else 0
+    return values.reshape(len(array), width, *values.shape[1:]) if len(array) else values
 
 
 def numbers(column: pa.ChunkedArray, name: str) -> np.ndarray:

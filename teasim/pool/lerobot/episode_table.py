@@ -124,6 +124,8 @@ def _checked_part(
 ) -> EpisodeTable:
     table = read_table(file, wanted=lambda name: not name.startswith("stats/"))
     columns = {}
+    ends = [name.replace("/from_", "/to_") for name in times]
+    times = [*times, *(name for name in ends if name in table.column_names)]
     for name in [*whole, *times]:
         if name not in table.column_names:
             raise PoolError(f"The episodes table of '{root}' is damaged: '{name}' is missing.")
