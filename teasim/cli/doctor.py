@@ -124,8 +124,7 @@ def probe_video() -> VideoProbe:
 
             start = time.perf_counter()
             _encode(path, frames)
-            clip = VideoClip.whole(path)
-            decoded = clip.frames(range(clip.length))
+            decoded = _decode(path)
         except Exception as error:  # whatever a codec or its binary may throw is the finding
             return VideoProbe(False, None, f"{type(error).__name__}: {error}")
         seconds = time.perf_counter() - start
@@ -151,6 +150,11 @@ def _encode(path: Path, frames: np.ndarray) -> None:
     for frame in frames:
         writer.add(frame)
     writer.close()
+
+
+def _decode(path: Path) -> np.ndarray:
+    clip = VideoClip.whole(path)
+    return clip.frames(np.arange(clip.length))
 
 
 def _version(package: str) -> str | None:
@@ -180,10 +184,9 @@ def _text(report: Report) -> str:
     video = report.video
     outcome = f"{video.ms_per_frame} ms per 224x224 frame, both ways" if video.ok else video.problem
     lines += ["video", f"  {_mark(video.ok)}  {'h264':<7} {outcome}", "reading"]
-    lines += [
-        f"  {_mark(not p)}  {name:<7} {p or ''}".rstrip() for name, p in report.codecs.items()
-    ]
-    lines += ["packages"]
+    for codec, problem in report.codecs.items():
+        lines.append(f"  {_mark(problem is None)}  {codec:<7} {problem or 'is read exactly'}")
+    lines.append("packages")
     lines += [f"  {name:<24} {found or 'missing'}" for name, found in report.packages.items()]
     lines += ["", *(f"To mend it, run: {fix}" for fix in report.fixes)]
     if report.ok:

@@ -1,5 +1,6 @@
 """Can this machine read the codecs that people's videos come in?"""
 
+import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,25 +30,30 @@ STEP = 40  # grey levels between two frames
 
 
 def probe_codecs() -> dict[str, str | None]:
-    """Write and read a tiny video of every codec.
+    """Write and read a tiny video of every codec that PyAV can write here.
 
     Returns:
-        Per codec what went wrong, in a few words; None where all frames came back.
+        Per codec what went wrong, in a few words; None where all frames came back. A codec is
+        left out if its encoder is missing and its decoder is not.
     """
+    import av
+
+    present = av.codecs_available
+    lacking = {
+        codec: "PyAV was built without its decoder" for codec in ENCODERS if codec not in present
+    }
     with tempfile.TemporaryDirectory() as folder:
-        return {codec: _problem(codec, Path(folder) / f"{codec}.mp4") for codec in ENCODERS}
+        tried = {
+            codec: _problem(codec, Path(folder) / f"{codec}.mp4")
+            for codec, (encoder, _) in ENCODERS.items()
+            if codec in present and encoder in present
+        }
+    return lacking | tried
 
 
 def _problem(codec: str, path: Path) -> str | None:
-    import av
-
-    if codec not in av.codecs_available:
-        return "PyAV was built without its decoder"
-    encoder, options = ENCODERS[codec]
-    if encoder not in av.codecs_available:
-        return f"not tried: PyAV was built without {encoder}"
     try:
-        _encode(path, encoder, options)
+        _encode(path, *ENCODERS[codec])
         clip = VideoClip.whole(path)
         levels = clip.frames(range(clip.length)).mean(axis=(1, 2, 3))
         complete = check_decodable(path) == clip.length == N_FRAMES
@@ -62,6 +68,7 @@ def _problem(codec: str, path: Path) -> str | None:
 def _encode(path: Path, encoder: str, options: Mapping[str, str]) -> None:
     import av
 
+    os.environ.setdefault("SVT_LOG", "0")  # libsvtav1 would describe itself on stderr
     with av.open(str(path), "w") as container:
         stream: Any = container.add_stream(encoder, 10, options=dict(options))
         stream.width, stream.height, stream.pix_fmt = SIDE, SIDE, "yuv420p"

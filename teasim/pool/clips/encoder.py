@@ -38,7 +38,7 @@ class VideoWriter:
         self._path = path
         self._shape = (height, width, 3)
         self._padding = ((0, height % 2), (0, width % 2), (0, 0))
-        self._messages = tempfile.TemporaryFile()
+        self._messages = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the writer)
         size = f"{width + width % 2}x{height + height % 2}"
         rate = str(Fraction(fps).limit_denominator(1001))
         source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", rate, "-i", "-"]
