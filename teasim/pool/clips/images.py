@@ -123,6 +123,8 @@ def _decoded(content: bytes, path: Path, what: str) -> np.ndarray:
     """Return an encoded picture as (H, W, 3) uint8 RGB."""
     from PIL import Image, UnidentifiedImageError
 
+    if not isinstance(content, bytes):
+        raise PoolError(f"The picture {what} in '{path}' is damaged or missing.")
     try:
         with Image.open(io.BytesIO(content), formats=FORMATS) as image:
             check_size(path, *image.size)
