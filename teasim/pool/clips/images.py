@@ -107,7 +107,8 @@ def _from_group(file: Any, group: int, name: str, rows: np.ndarray) -> Iterator[
         inside = rows[(rows >= first) & (rows < first + len(batch))] - first
         for row in inside.tolist():
             value = batch.column(0)[row].as_py()
-            yield (value.get("bytes") if isinstance(value, dict) else value) or b""
+            stored = value.get("bytes") if isinstance(value, dict) else value
+            yield stored if isinstance(stored, bytes) else b""
         first += len(batch)
 
 
@@ -123,8 +124,6 @@ def _decoded(content: bytes, path: Path, what: str) -> np.ndarray:
     """Return an encoded picture as (H, W, 3) uint8 RGB."""
     from PIL import Image, UnidentifiedImageError
 
-    if not isinstance(content, bytes):
-        raise PoolError(f"The picture {what} in '{path}' is damaged or missing.")
     try:
         with Image.open(io.BytesIO(content), formats=FORMATS) as image:
             check_size(path, *image.size)
