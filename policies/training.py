@@ -25,6 +25,7 @@ from policies.settings import TrainSettings, job_count
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder
 from teasim.pool import Pool
+from teasim.pool.soundness import require_sound
 
 RECORDED = ("learner", "level", "observe", "camera", "expert", "seed")
 """Settings that are stored with a policy as they were given."""
@@ -95,6 +96,7 @@ def train(settings: TrainSettings) -> Training:
     options = read_options(settings.learner, kind, parse_assignments(settings.learner_settings))
     demos = DemosConfig(observe=settings.observe, cameras=settings.camera)
     pool = Pool.open(settings.pool)
+    require_sound(pool)
     weights = demo_weights(pool, settings.weights, settings.chosen_use)
     options |= provide(kind, pool, settings)
     check_new_folder(settings.out)

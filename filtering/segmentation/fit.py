@@ -22,6 +22,7 @@ from filtering.vision.frames import chosen_cameras, frame_rate
 from teasim.common.errors import ConfigError, PoolError
 from teasim.common.files import check_new_folder
 from teasim.pool.readers.registry import open_source
+from teasim.pool.soundness import require_sound
 from teasim.pool.source import Demonstration, Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
@@ -58,6 +59,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
     began = time.perf_counter()
     pool = open_source(source)
     check_new_folder(out)
+    require_sound(pool)
     frames = FrameSource(chosen_cameras(pool, config.cameras) or pool.cameras, config.rate)
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))

@@ -12,6 +12,7 @@ from filtering.segmentation.segments import decode
 from teasim.common.files import check_new_folder, write_json
 from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
 from teasim.pool.readers.registry import open_source
+from teasim.pool.soundness import require_sound
 from teasim.pool.source import Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
@@ -45,6 +46,7 @@ def predict(segmenter_folder: Path, source: Path, out: Path, *, jobs: int = 1) -
 
 
 def _predict_pool(segmenter: MSTCNSegmenter, pool: Source, out: Path, jobs: int) -> ScoresByPart:
+    require_sound(pool)
     found = segmenter.segment(pool, jobs=jobs)
     assert found.posteriors is not None
     scores = score_episodes(pool.episodes, found)

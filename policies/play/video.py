@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.data.samples import Observation, Policy, pictures
-from teasim.pool.videos import VideoWriter
+from teasim.pool.clips import VideoWriter
 
 STRIP = 24
 """Height of the strip below the picture [pixel]; even, as the video codec needs it."""

@@ -97,6 +97,8 @@ class SequencePool:
     """Frames (lines) per second; None where it is not known and times are counted in frames."""
     cameras: tuple[str, ...] = ()
     """None: there are no pictures."""
+    notes: tuple[str, ...] = ()
+    """Sentences on what is unusual but harms nothing."""
 
     @classmethod
     def open(cls, path: Path | str, fps: float | None = None) -> Self:
@@ -108,6 +110,17 @@ class SequencePool:
         folder = MSTCNFolder.open(path)
         episodes = [LabelledSequence(folder, name, k) for k, name in enumerate(folder.videos)]
         return cls(folder.root, folder.names, tuple(episodes), fps)
+
+    def problems(self) -> list[str]:
+        """Return a sentence for each label file that is damaged."""
+        found = []
+        for episode in self.episodes:
+            try:
+                episode.spans()
+                found += [] if episode.length else [f"The video '{episode.name}' has no frame."]
+            except PoolError as error:
+                found.append(str(error))
+        return found
 
     def content_hash(self) -> str:
         """Return a SHA-256 over the names and labels of all videos."""

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from teasim.common.errors import PoolError
+from teasim.pool.clips import VideoClip, VideoWriter
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.identity import demo_id
 from teasim.pool.lerobot.staging import (
@@ -20,7 +21,6 @@ from teasim.pool.lerobot.staging import (
 )
 from teasim.pool.lerobot.statistics import FRAME_STRIDE, ImageHistogram
 from teasim.pool.types import NO_SUBTASK, EpisodeRecord, PoolHeader, index_from_spans
-from teasim.pool.videos import VideoWriter, video_content
 
 
 class EpisodeWriter:
@@ -130,16 +130,16 @@ class EpisodeWriter:
         self._check_record(record)
         for video in self._videos.values():
             video.close()
-        videos = {
-            camera: video_content(self._folder / f"{camera}.mp4").digests
-            for camera in self._header.cameras
-        }
+        fps = float(self._header.fps)
+        first = min(self._header.cameras)
+        clip = VideoClip(self._folder / f"{first}.mp4", 0.0, self._length, fps)
+        pictures = {layout.CAMERA_PREFIX + first: clip.digest()}
         logs = {name: np.stack(self._columns[name]) for name in _vector_columns(self._header)}
         staged = StagedEpisode(
             folder=self._folder,
             columns=self._table(),
             record=record,
-            demo_id=demo_id(videos, logs),
+            demo_id=demo_id(pictures, logs),
             histograms=self._histograms,
         )
         save_staged(staged, staged_folder(self._root, self._index))

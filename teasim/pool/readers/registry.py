@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from teasim.common.errors import PoolError
+from teasim.pool.hub import located, missing
 from teasim.pool.readers import lerobot, ms_tcn
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.source import Source
@@ -15,15 +16,36 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
     """Open what is stored at `path`, whatever its format.
 
     Args:
-        path: a folder or file.
+        path: a folder or file, or the name of a data set in the local cache of the Hugging Face
+            Hub (`teasim.pool.hub`).
         options: what the format does not store; None means nothing was said.
 
     Raises:
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it, or it is damaged.
     """
-    place = Path(path)
+    place = located(path)
     return reader_of(place).open(place, options or ReadOptions())
+
+
+def check_source(path: Path | str, options: ReadOptions | None = None) -> list[str]:
+    """Look for damage in all of what is stored at `path`, pictures included.
+
+    Returns:
+        One sentence per problem; empty when the source is sound.
+
+    Raises:
+        ConfigError: an option does not fit the format.
+        PoolError: no reader recognises it.
+    """
+    place = located(path)
+    reader = reader_of(place)
+    if reader.check is not None:
+        return reader.check(place)
+    try:
+        return reader.open(place, options or ReadOptions()).problems()
+    except PoolError as error:
+        return [str(error)]
 
 
 def reader_of(path: Path) -> Reader:
@@ -32,8 +54,9 @@ def reader_of(path: Path) -> Reader:
     Raises:
         PoolError: there is nothing at `path`, or no reader recognises it.
     """
+    path = located(path)
     if not path.exists():
-        raise PoolError(f"There is nothing at '{path}'; name a folder with demonstrations.")
+        raise PoolError(missing(path))
     for reader in READERS:
         if reader.recognises(path):
             return reader
