@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from teasim.common.errors import PoolError
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool.readers import lerobot, ms_tcn
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.source import Source
@@ -22,8 +22,14 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it, or it is damaged.
     """
-    place = Path(path)
-    return reader_of(place).open(place, options or ReadOptions())
+    place, options = Path(path), options or ReadOptions()
+    reader = reader_of(place)
+    for name in options.given():
+        if name not in reader.options:
+            raise ConfigError(
+                f"'{place}' is read as {reader.name}, which has no use for {name}; leave it out."
+            )
+    return reader.open(place, options)
 
 
 def reader_of(path: Path) -> Reader:
