@@ -30,7 +30,7 @@ from teasim.constants import (
 )
 from teasim.generate import GenerateConfig, demo_rng, plan_pool
 from teasim.generate.recording import generate_demo
-from teasim.pool.videos import VideoWriter
+from teasim.pool.clips import VideoWriter
 from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
 from teasim.world.simulation import Simulation

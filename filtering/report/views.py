@@ -12,7 +12,7 @@ from filtering.report.layout import Mark
 from filtering.report.page import DemoView, Segment
 from filtering.vision.frames import frame_rate
 from teasim.pool.source import Clip, Source
-from teasim.pool.videos import VideoWriter
+from teasim.pool.clips import VideoWriter
 
 
 def demo_views(pool: Source, fitted: DemoFilter) -> list[DemoView]:

@@ -17,7 +17,7 @@ from policies.data.features import NO_MAPS, Maps, camera_maps
 from policies.data.samples import DecisionSamples, ObservationSpec
 from teasim.common import parallel
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool import Episode, Pool, read_frames
+from teasim.pool import Episode, Pool
 
 STATE_COLUMN = "observation.state"
 ENVIRONMENT_COLUMN = "observation.environment_state"
@@ -91,7 +91,7 @@ def observation_spec(pool: Pool, config: DemosConfig) -> ObservationSpec:
         return ObservationSpec((), 0, 0, tuple(pool.state_names or ()), _environment_names(pool))
     names = () if config.observe == "pixels" else pool.state_names or ()
     cameras = config.cameras or pool.cameras
-    height, width, _ = read_frames(pool.episodes[0].clip(cameras[0]), [0])[0].shape
+    height, width, _ = pool.episodes[0].clip(cameras[0]).frames([0])[0].shape
     return ObservationSpec(cameras, height, width, tuple(names))
 
 
@@ -115,7 +115,7 @@ def _maps(episode: Episode, starts: list[int], spec: ObservationSpec, config: De
         return np.empty((len(starts), 1, *NO_MAPS), dtype=np.float16)
     random = np.random.default_rng([config.seed, zlib.crc32(episode.demo_id.encode())])
     seen = {
-        camera: views(read_frames(episode.clip(camera), starts), config.copies, random)
+        camera: views(episode.clip(camera).frames(starts), config.copies, random)
         for camera in spec.cameras
     }
     flat = {camera: frames.reshape(-1, *frames.shape[2:]) for camera, frames in seen.items()}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from policies.data.samples import Observation, ObservationSpec, Policy, pictures
 from policies.play.captions import caption
 from teasim.common.errors import CheckpointError, ConfigError
-from teasim.pool.videos import VideoWriter
+from teasim.pool.clips import VideoWriter
 
 ENVIRONMENT = "teasim:teasim/TeaMakingSubtasks-v0"
 

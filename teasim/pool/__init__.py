@@ -1,5 +1,6 @@
 """A pool of demonstrations on disk: reading, writing, checking, and the weights beside it."""
 
+from teasim.pool.clips import VideoClip
 from teasim.pool.lerobot import (
     Episode,
     EpisodeWriter,
@@ -15,7 +16,6 @@ from teasim.pool.types import (
     PoolHeader,
     Span,
 )
-from teasim.pool.videos import VideoClip, read_frames
 
 __all__ = [
     "Episode",
@@ -30,5 +30,4 @@ __all__ = [
     "claim_folder",
     "episode_is_done",
     "finalize_pool",
-    "read_frames",
 ]

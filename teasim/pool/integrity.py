@@ -8,11 +8,12 @@ import numpy as np
 
 from teasim.common.errors import PoolError
 from teasim.common.files import sha256_of
+from teasim.pool.clips import check_decodable, probe
 from teasim.pool.lerobot import layout
+from teasim.pool.lerobot.identity import ID_PREFIX
 from teasim.pool.lerobot.metadata import require_pool_folder
 from teasim.pool.lerobot.reader import Episode, Pool
 from teasim.pool.types import NO_SUBTASK
-from teasim.pool.videos import count_decodable, video_content
 
 TIME_TOLERANCE = 1e-3
 """Largest deviation of a timestamp from frame_index / fps [s]."""
@@ -132,7 +133,7 @@ def _check_videos(pool: Pool) -> Iterator[str]:
         ends: dict[Path, tuple[int, int]] = {}
         for episode in pool.episodes:
             clip = episode.clip(camera)
-            end = clip.start_frame + clip.length
+            end = round(clip.start * clip.fps) + clip.length
             ends[clip.path] = max(ends.get(clip.path, (0, 0)), (end, episode.index))
         for path, (end, last) in ends.items():
             yield from _sentences(partial(_check_video, pool, path, end, last))
@@ -142,7 +143,7 @@ def _check_video(pool: Pool, path: Path, end: int, last: int) -> Iterator[str]:
     """One mp4: it decodes, and it is as long as the logs of the demonstrations in it."""
     name = path.relative_to(pool.root).as_posix()
     known = name in pool.manifest.get("sha256", {})
-    n_frames = video_content(path).n_frames if known else count_decodable(path)
+    n_frames = probe(path).n_frames if known else check_decodable(path)
     if n_frames < end:
         yield (
             f"The video '{path}' is shorter than the log: it has {n_frames} frames but "
@@ -163,7 +164,7 @@ def _check_identities(pool: Pool) -> Iterator[str]:
 def _check_identity(episode: Episode) -> Iterator[str]:
     """Is the demonstration the one its stored identity was made from?"""
     told = episode.row.get("teasim/demo_id")
-    if told is not None and episode.content_id() != told:
+    if told and told.startswith(ID_PREFIX) and episode.content_id() != told:
         yield f"Demonstration {episode.index} is not the one that was written as {told}."
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from teasim.common.errors import PoolError
 from teasim.common.statistics import auroc
 from teasim.pool.lerobot import Episode, Pool
-from teasim.pool.videos import read_frames
 
 MOTION_STEP = 5
 """Motion is measured between frames this far apart."""
@@ -52,7 +51,7 @@ def _segments(_: Pool, episode: Episode) -> float:
 def _motion(pool: Pool, episode: Episode) -> float:
     """Mean difference of the first camera's grey values over MOTION_STEP frames."""
     clip = episode.clip(pool.cameras[0])
-    frames = read_frames(clip, np.arange(0, episode.length, MOTION_STEP))
+    frames = clip.frames(np.arange(0, episode.length, MOTION_STEP))
     grey = frames[:, ::2, ::2].mean(axis=3, dtype=np.float32)
     return float(np.abs(np.diff(grey, axis=0)).mean()) if len(grey) > 1 else 0.0
 

@@ -13,7 +13,7 @@ from filtering.vision.frame_features import (
     sampled_frames,
 )
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool import Pool, read_frames
+from teasim.pool import Pool
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_features_of_all_cameras_stand_side_by_side(toy_pool: Pool):
     (found,) = frame_features([episode], toy_pool.fps, FrameSource(("cup", "left"), 5.0), jobs=1)
     moments = np.arange(1, episode.length, 2)
     for place, camera in enumerate(("cup", "left")):
-        expected = describe_frames(read_frames(episode.clip(camera), moments))
+        expected = describe_frames(episode.clip(camera).frames(moments))
         part = found[:, place * FRAME_FEATURES : (place + 1) * FRAME_FEATURES]
         np.testing.assert_array_equal(part, expected)
 

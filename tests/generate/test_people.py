@@ -9,7 +9,6 @@ from teasim.cli.main import main
 from teasim.common.errors import ConfigError
 from teasim.generate import DemoPlan, GenerateConfig, generate, plan_pool
 from teasim.generate.presets import PRESETS, find_preset
-from teasim.pool import read_frames
 from teasim.pool.integrity import check_pool
 from teasim.skills.demonstrators import PARTICIPANTS
 from teasim.task.mistakes import Plan, PlannedMistake
@@ -66,7 +65,7 @@ def test_a_film_of_a_person_has_no_log(films):
 def test_a_random_look_films_the_same_demonstration(films):
     fixed, other = (films[look].episodes[0] for look in ("fixed", "random"))
     assert fixed.length == other.length
-    pictures = [read_frames(episode.clip("left"), [5]) for episode in (fixed, other)]
+    pictures = [episode.clip("left").frames([5]) for episode in (fixed, other)]
     assert np.abs(np.subtract(*pictures, dtype=np.int16)).mean() > 3
 
 

@@ -8,7 +8,6 @@ from policies.data.features import camera_maps
 from policies.data.samples import ObservationSpec
 from teasim.common.errors import ConfigError, PoolError
 from teasim.constants import STATE_NAMES, SUBTASKS
-from teasim.pool import read_frames
 from tests.policies.fakes import FLAGS
 
 
@@ -26,7 +25,7 @@ def test_decisions_of_a_pool(decisions):
 def test_the_first_view_is_the_frame_at_the_start_of_the_span(fake_pool, decisions):
     episode = fake_pool.episodes[0]
     starts = [span.start for span in episode.spans()]
-    frames = {camera: read_frames(episode.clip(camera), starts) for camera in ("left", "cup")}
+    frames = {camera: episode.clip(camera).frames(starts) for camera in ("left", "cup")}
     maps = camera_maps(frames, ("left", "cup")).astype(float)
     # The batches differ, and with them the last bit of a half.
     np.testing.assert_allclose(decisions.maps[:7, 0], maps, rtol=2e-3, atol=2e-3)

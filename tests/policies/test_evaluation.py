@@ -10,7 +10,7 @@ from policies.play.rollout import EnvironmentConfig, Episode, make_environment, 
 from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.statistics import rate
 from teasim.constants import STATE_NAMES
-from teasim.pool.videos import VideoClip, count_decodable, read_frames
+from teasim.pool.clips import VideoClip, check_decodable
 from tests.policies.fakes import FAKE_WORLD, FLAGS, SEQ_1, SUBTASKS, ScriptedPolicy
 
 
@@ -104,9 +104,9 @@ def test_no_episode_is_no_evaluation():
 def test_the_video_has_one_frame_per_decision_and_the_last(tmp_path):
     evaluate(ScriptedPolicy(), config(1, video=tmp_path / "seen"))
     assert [path.name for path in (tmp_path / "seen").iterdir()] == ["episode_1000.mp4"]
-    clip = VideoClip(tmp_path / "seen" / "episode_1000.mp4", 0, 8)
-    assert count_decodable(clip.path) == 8
-    frames = read_frames(clip, range(8))
+    clip = VideoClip.whole(tmp_path / "seen" / "episode_1000.mp4")
+    assert check_decodable(clip.path) == 8
+    frames = clip.frames(range(8))
     assert frames.shape == (8, 64 + STRIP, 128, 3)
     pictures, strips = frames[:, :64], frames[:, 64:]
     assert np.ptp(pictures[0].mean(axis=(1, 2))) < 3
@@ -119,7 +119,7 @@ def test_a_policy_without_cameras_can_be_filmed_and_sees_no_picture(tmp_path):
     policy.spec = ObservationSpec((), 0, 0, STATE_NAMES, FLAGS)
     s = evaluate(policy, config(1, video=tmp_path / "seen"))["deterministic"]
     assert s.success.value == 1
-    assert count_decodable(tmp_path / "seen" / "episode_1000.mp4") == 8
+    assert check_decodable(tmp_path / "seen" / "episode_1000.mp4") == 8
 
 
 def test_a_caption_leaves_the_picture_alone_and_fits():

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from teasim.common.errors import PoolError
-from teasim.pool import Pool, read_frames
+from teasim.pool import Pool
 from teasim.pool.integrity import check_pool
 from tests.toy_pool import copy_pool, make_toy_pool, rewrite_table
 
@@ -90,8 +90,8 @@ def test_sound_pools_have_no_problem(toy_pool: Pool, foreign_pool: Pool) -> None
         ),
         (
             EPISODES,
-            set_value("teasim/demo_id", 1, "0" * 16),
-            "Demonstration 1 is not the one that was written as 0000000000000000.",
+            set_value("teasim/demo_id", 1, "v2-" + "0" * 16),
+            "Demonstration 1 is not the one that was written as v2-0000000000000000.",
         ),
         (
             EPISODES,
@@ -201,7 +201,7 @@ def read_everything(root: Path) -> None:
         assert episode.record is None or episode.record.sequence
         for name in ("observation.state", "action", "next.success", "subtask_index"):
             assert len(episode.column(name)) == episode.length
-        frames = read_frames(episode.clip("left"), np.arange(episode.length))
+        frames = episode.clip("left").frames(np.arange(episode.length))
         assert frames.shape[0] == episode.length
 
 

@@ -17,7 +17,6 @@ from teasim.pool import (
     Pool,
     Span,
     finalize_pool,
-    read_frames,
 )
 from teasim.pool.integrity import check_pool
 from teasim.pool.types import spans_from_index
@@ -93,7 +92,7 @@ def test_what_is_written_is_read(
         np.testing.assert_array_equal(episode.column("next.reward"), np.arange(n) / 2)
         np.testing.assert_array_equal(episode.column("next.success"), np.arange(n) % 2 == 1)
         np.testing.assert_array_equal(episode.column("next.done"), np.arange(n) == n - 1)
-        levels = read_frames(episode.clip("left"), range(n)).mean((1, 2, 3))
+        levels = episode.clip("left").frames(range(n)).mean((1, 2, 3))
         np.testing.assert_allclose(levels, 20 * np.arange(n), atol=4)
         assert episode.content_id() == episode.demo_id
     assert check_pool(root) == []
@@ -131,7 +130,7 @@ def test_a_foreign_data_set_opens_without_ground_truth(foreign_pool: Pool) -> No
         assert episode.column("action").shape == (episode.length, 6)
         np.testing.assert_array_equal(episode.column("frame_index"), np.arange(episode.length))
         assert (episode.column("episode_index") == episode.index).all()
-        assert read_frames(episode.clip("cam_top"), [0, episode.length - 1]).shape[0] == 2
+        assert episode.clip("cam_top").frames([0, episode.length - 1]).shape[0] == 2
         total += episode.length
     assert total == foreign_pool.info["total_frames"]
     assert len({episode.demo_id for episode in foreign_pool.episodes}) == len(foreign_pool.episodes)
@@ -185,7 +184,7 @@ def test_identity_survives_renumbering(tmp_path: Path) -> None:
     one = make_toy_pool(tmp_path / "one", [SEQ_1], **options)  # type: ignore[arg-type]
     header = toy_header([SEQ_1], size=16, cameras=("left",))
     source = one.episodes[0]
-    frames = read_frames(source.clip("left"), range(source.length))
+    frames = source.clip("left").frames(range(source.length))
     for index in (0, 1):
         with EpisodeWriter(tmp_path / "two", index, header) as writer:
             for frame in range(source.length):

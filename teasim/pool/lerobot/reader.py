@@ -10,13 +10,13 @@ from typing import Any, Self
 import numpy as np
 
 from teasim.common.errors import PoolError
+from teasim.pool.clips import VideoClip
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, read_column
 from teasim.pool.lerobot.identity import demo_id, is_content
 from teasim.pool.lerobot.metadata import Metadata, Row, read_metadata
 from teasim.pool.selection import lerobot_usage
 from teasim.pool.types import GroundTruth, MistakeSpan, Span, spans_from_index
-from teasim.pool.videos import VideoClip
 
 
 class Episode:
@@ -64,12 +64,12 @@ class Episode:
         return self.row.get("teasim/demo_id") or self.content_id()
 
     def content_id(self) -> str:
-        """Identity computed from the encoded frames and the logs on disk.
+        """Identity computed from the decoded frames and the logs on disk.
 
         Raises:
             PoolError: A file is missing or damaged, or ends too early.
         """
-        videos = {camera: self.clip(camera).packet_digests() for camera in self._meta.video_keys}
+        videos = {camera: self.clip(camera).digest() for camera in self._meta.video_keys}
         names = [name for name in self._meta.info["features"] if is_content(name)]
         logs = {
             name: self.column(name) for name in names if name not in self._meta.video_keys.values()
@@ -188,8 +188,9 @@ class Episode:
             choices = ", ".join(self._meta.video_keys) or "none"
             raise PoolError(f"The pool has no camera '{camera}'; it has {choices}.")
         key = self._meta.video_keys[camera]
-        start = round(float(self.row[f"videos/{key}/from_timestamp"]) * self._meta.fps)
-        return VideoClip(self._meta.video_path(self.row, key), start, self.length)
+        start = float(self.row[f"videos/{key}/from_timestamp"])
+        path = self._meta.video_path(self.row, key)
+        return VideoClip(path, start, self.length, float(self._meta.fps))
 
 
 class Pool:

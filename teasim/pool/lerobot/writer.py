@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from teasim.common.errors import PoolError
+from teasim.pool.clips import VideoClip, VideoWriter
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.identity import demo_id
 from teasim.pool.lerobot.staging import (
@@ -20,7 +21,6 @@ from teasim.pool.lerobot.staging import (
 )
 from teasim.pool.lerobot.statistics import FRAME_STRIDE, ImageHistogram
 from teasim.pool.types import NO_SUBTASK, EpisodeRecord, PoolHeader, index_from_spans
-from teasim.pool.videos import VideoWriter, video_content
 
 
 class EpisodeWriter:
@@ -130,9 +130,11 @@ class EpisodeWriter:
         self._check_record(record)
         for video in self._videos.values():
             video.close()
+        paths = {camera: self._folder / f"{camera}.mp4" for camera in self._header.cameras}
+        fps = float(self._header.fps)
         videos = {
-            camera: video_content(self._folder / f"{camera}.mp4").digests
-            for camera in self._header.cameras
+            camera: VideoClip(path, 0.0, self._length, fps).digest()
+            for camera, path in paths.items()
         }
         logs = {name: np.stack(self._columns[name]) for name in _vector_columns(self._header)}
         staged = StagedEpisode(

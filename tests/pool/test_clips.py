@@ -7,16 +7,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from teasim.common.errors import PoolError
-from teasim.pool import Pool, VideoClip, read_frames
-from teasim.pool.videos import VideoWriter, count_decodable, video_content
+from teasim.pool import Pool, VideoClip
+from teasim.pool.clips import VideoWriter, check_decodable, probe
 from tests.toy_pool import COLOURS
 
 N_FRAMES = 25
 SIZE = 32
+FPS = 10
+
+
+READERS: tuple[Callable[[Path], object], ...] = (
+    probe,
+    check_decodable,
+    VideoClip.whole,
+    lambda path: VideoClip(path, 0, 5, FPS).frames([0]),
+    lambda path: VideoClip(path, 0, 5, FPS).digest(),
+    lambda path: VideoClip(path, 0, 5, FPS).mp4(),
+)
 
 
 def write_video(path: Path, images: np.ndarray) -> Path:
-    writer = VideoWriter(path, height=images.shape[1], width=images.shape[2], fps=10)
+    writer = VideoWriter(path, height=images.shape[1], width=images.shape[2], fps=FPS)
     for image in images:
         writer.add(image)
     writer.close()
@@ -37,7 +48,7 @@ def video(tmp_path_factory: pytest.TempPathFactory, images: np.ndarray) -> Path:
 
 
 def test_frames_come_back_in_rgb_and_nearly_unchanged(video: Path, images: np.ndarray) -> None:
-    frames = read_frames(VideoClip(video, 0, N_FRAMES), range(N_FRAMES))
+    frames = VideoClip.whole(video).frames(range(N_FRAMES))
     assert frames.shape == images.shape
     assert frames.dtype == np.uint8
     assert np.abs(frames.astype(int) - images).max() <= 6
@@ -48,20 +59,21 @@ def test_frames_come_back_in_rgb_and_nearly_unchanged(video: Path, images: np.nd
 def test_any_selection_is_a_selection_of_the_whole(
     video: Path, start: int, data: st.DataObject
 ) -> None:
-    clip = VideoClip(video, start, N_FRAMES - start)
+    clip = VideoClip(video, start / FPS, N_FRAMES - start, FPS)
     indices = data.draw(st.lists(st.integers(0, clip.length - 1), min_size=1, max_size=8))
-    whole = read_frames(VideoClip(video, 0, N_FRAMES), range(N_FRAMES))
-    np.testing.assert_array_equal(read_frames(clip, indices), whole[start:][indices])
+    whole = VideoClip.whole(video).frames(range(N_FRAMES))
+    np.testing.assert_array_equal(clip.frames(indices), whole[start:][indices])
 
 
 def test_a_clip_inside_a_foreign_file_starts_at_its_own_frame(foreign_pool: Pool) -> None:
     clips = [episode.clip("cam_top") for episode in foreign_pool.episodes]
-    whole = VideoClip(clips[0].path, 0, sum(clip.length for clip in clips))
-    frames = read_frames(whole, range(whole.length))
+    whole = VideoClip.whole(clips[0].path)
+    frames = whole.frames(range(whole.length))
     assert len({clip.path for clip in clips}) == 1
     for clip in clips:
-        part = frames[clip.start_frame : clip.start_frame + clip.length]
-        np.testing.assert_array_equal(read_frames(clip, range(clip.length)), part)
+        start = round(clip.start * clip.fps)
+        part = frames[start : start + clip.length]
+        np.testing.assert_array_equal(clip.frames(range(clip.length)), part)
 
 
 def test_equal_frames_give_equal_bytes(tmp_path: Path, video: Path, images: np.ndarray) -> None:
@@ -70,19 +82,19 @@ def test_equal_frames_give_equal_bytes(tmp_path: Path, video: Path, images: np.n
 
 
 def test_packets_and_decoder_count_alike(video: Path) -> None:
-    assert video_content(video).n_frames == count_decodable(video) == N_FRAMES
+    assert probe(video).n_frames == check_decodable(video) == N_FRAMES
 
 
 @pytest.mark.parametrize("indices", [[-1], [N_FRAMES], []])
 def test_indices_outside_the_clip_are_refused(video: Path, indices: list[int]) -> None:
     with pytest.raises(IndexError):
-        read_frames(VideoClip(video, 0, N_FRAMES), indices)
+        VideoClip.whole(video).frames(indices)
 
 
 def test_a_short_video_is_told_with_its_frame(video: Path) -> None:
-    clip = VideoClip(video, 0, N_FRAMES + 5)
+    clip = VideoClip(video, 0, N_FRAMES + 5, FPS)
     with pytest.raises(PoolError) as caught:
-        read_frames(clip, [0, N_FRAMES + 2])
+        clip.frames([0, N_FRAMES + 2])
     assert str(caught.value) == (
         f"The video '{video}' is damaged or too short: frame {N_FRAMES + 2} of the "
         f"{N_FRAMES + 5} of this demonstration cannot be read."
@@ -93,18 +105,16 @@ def test_a_short_video_is_told_with_its_frame(video: Path) -> None:
 def test_what_is_no_video_is_told_in_one_sentence(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.mp4"
     path.write_bytes(content)
-    with pytest.raises(PoolError, match=r"cannot be opened; it is damaged\.$"):
-        read_frames(VideoClip(path, 0, 5), [0])
-    for read in (video_content, count_decodable):
-        with pytest.raises(PoolError, match=r"is damaged and cannot be decoded\.$"):
+    for read in READERS:
+        with pytest.raises(PoolError, match=r"cannot be opened; it is damaged\.$"):
             read(path)
 
 
 def test_a_missing_video_is_told_as_missing(tmp_path: Path) -> None:
     path = tmp_path / "x.mp4"
-    for read in (lambda: read_frames(VideoClip(path, 0, 5), [0]), lambda: video_content(path)):
+    for read in READERS:
         with pytest.raises(PoolError, match=r"^The video '.*x\.mp4' is missing\.$"):
-            read()
+            read(path)
 
 
 def fill(writer: VideoWriter) -> None:
@@ -117,7 +127,7 @@ def fill(writer: VideoWriter) -> None:
 def test_an_encoder_that_cannot_write_is_told(
     tmp_path: Path, use: Callable[[VideoWriter], None]
 ) -> None:
-    writer = VideoWriter(tmp_path / "no folder" / "x.mp4", height=SIZE, width=SIZE, fps=10)
+    writer = VideoWriter(tmp_path / "no folder" / "x.mp4", height=SIZE, width=SIZE, fps=FPS)
     with pytest.raises(PoolError, match=r"^The encoder stopped while writing '.*'; check the free"):
         use(writer)
     writer.abort()

@@ -1,0 +1,7 @@
+"""The pictures of one demonstration by one camera, wherever they are stored."""
+
+from teasim.pool.clips.encoder import VideoWriter
+from teasim.pool.clips.probe import VideoInfo, check_decodable, probe
+from teasim.pool.clips.video import VideoClip
+
+__all__ = ["VideoClip", "VideoInfo", "VideoWriter", "check_decodable", "probe"]
