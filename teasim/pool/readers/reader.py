@@ -46,3 +46,5 @@ class Reader:
     """Opens the path; raises PoolError when it is damaged and ConfigError for a wrong option."""
     options: tuple[str, ...] = ("fps",)
     """Fields of `ReadOptions` that `open` looks at; any other one that is given is refused."""
+    find: Callable[[str], Path | None] | None = None
+    """Returns where the data set of a name that is no path is stored; None where there is none."""
