@@ -11,8 +11,8 @@ from filtering.judging.explain import Clock, Finding, gravest
 from filtering.report.layout import Mark
 from filtering.report.page import DemoView, Segment
 from filtering.vision.frames import frame_rate
-from teasim.pool.source import Clip, Source
 from teasim.pool.clips import VideoWriter
+from teasim.pool.source import Clip, Source
 
 
 def demo_views(pool: Source, fitted: DemoFilter) -> list[DemoView]:

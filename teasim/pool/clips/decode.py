@@ -46,6 +46,8 @@ class Video:
         rate = self.stream.average_rate or self.stream.guessed_rate
         self.gap = float(1 / rate) if rate else 0.04
         """Usual time between two frames [s]."""
+        self.counted = self.stream.start_time is None or self.container.format.name == "avi"
+        """Whether the format stores no times of presentation, so that frames are counted."""
 
     def __enter__(self) -> Self:
         """Return the video."""
@@ -55,38 +57,46 @@ class Video:
         """Close the file."""
         self.container.close()
 
-    def time_of(self, stamped: Any) -> float:
-        """Return when a frame or packet is presented [s]; it has `pts`, or at least `dts`."""
-        stamp = stamped.dts if stamped.pts is None else stamped.pts
-        return ((stamp or 0) - self._start) * self._base.numerator / self._base.denominator
+    def times(self) -> list[float]:
+        """Read all packets and return when each frame is presented [s], ascending."""
+        shown = [
+            packet
+            for packet in self.container.demux(self.stream)
+            if packet.size and not packet.is_discard
+        ]
+        if self.counted:
+            return [place * self.gap for place in range(len(shown))]
+        return sorted(self._time_of(packet) for packet in shown)
 
     def key_times(self) -> list[float]:
         """Return about where the key frames lie [s], ascending; empty if the file has no index."""
-        return sorted(
-            (entry.timestamp - self._start) * self._base.numerator / self._base.denominator
-            for entry in self.stream.index_entries
-            if entry.is_keyframe
-        )
+        if self.counted:
+            return []
+        keys = (entry.timestamp for entry in self.stream.index_entries if entry.is_keyframe)
+        return sorted(self._seconds(stamp) for stamp in keys)
 
-    def frames_from(self, time: float) -> Iterator[Any]:
-        """Yield the decoded frames from one at or before `time` on, in order of presentation.
+    def frames_from(self, time: float) -> Iterator[tuple[float, Any]]:
+        """Yield time and decoded frame from one at or before `time` on, in order of presentation.
 
         A jump lands on a key frame. Frames presented before it may lack what they refer to (open
         groups of pictures) and are dropped; if nothing at or before `time` is left, the jump goes
         further back, at last to the start of the file.
         """
         back = 0.0
-        while time - back > 0:
+        while time - back > 0 and not self.counted:
             run = self._run_from_key_frame(time - back)
             first = next(run, None)
-            if first is not None and self.time_of(first) <= time + SLACK * self.gap:
+            if first is not None and first[0] <= time + SLACK * self.gap:
                 return chain([first], run)
             back = max(2 * back, 1.0)
         self.container.close()
         self._open()
-        return self._run(None)
+        run = self._run(jumped=False)
+        if self.counted:
+            return ((place * self.gap, frame) for place, (_, frame) in enumerate(run))
+        return run
 
-    def _run_from_key_frame(self, time: float) -> Iterator[Any]:
+    def _run_from_key_frame(self, time: float) -> Iterator[tuple[float, Any]]:
         import av
 
         stamp = (time + SLACK * self.gap) * self._base.denominator / self._base.numerator
@@ -94,21 +104,29 @@ class Video:
             self.container.seek(int(stamp) + self._start, stream=self.stream)
         except av.FFmpegError:
             return iter(())
-        return self._run(self.stream)
+        return self._run(jumped=True)
 
-    def _run(self, jumped: Any) -> Iterator[Any]:
+    def _run(self, *, jumped: bool) -> Iterator[tuple[float, Any]]:
         first = None
         for packet in self.container.demux(self.stream):
             if packet.is_corrupt:
                 raise damaged(self.path)
             if first is None:
-                first = self.time_of(packet)
+                first = self._time_of(packet)
             for frame in packet.decode():
-                if jumped and (self.time_of(frame) < first or frame.is_corrupt):
+                time = self._time_of(frame)
+                if jumped and (time < first or frame.is_corrupt):
                     continue
                 if max(frame.width, frame.height) > MAX_SIDE:
                     raise _too_large(self.path, frame.width, frame.height)
-                yield frame
+                yield time, frame
+
+    def _time_of(self, stamped: Any) -> float:
+        """Return when a frame or packet is presented [s]."""
+        return self._seconds(stamped.dts if stamped.pts is None else stamped.pts)
+
+    def _seconds(self, stamp: int | None) -> float:
+        return ((stamp or 0) - self._start) * self._base.numerator / self._base.denominator
 
 
 def nearest_frames(path: Path, times: Sequence[float]) -> Iterator[Any]:
@@ -121,16 +139,17 @@ def nearest_frames(path: Path, times: Sequence[float]) -> Iterator[Any]:
         PoolError: The file is missing, is no video, or is damaged.
     """
     with Video(path) as video, damage_told(path):
-        keys, run = video.key_times(), iter(())
-        before: Any = None
-        after: Any = None
+        keys = video.key_times()
+        run: Iterator[tuple[float, Any]] = iter(())
+        before: tuple[float, Any] | None = None
+        after: tuple[float, Any] | None = None
         for time in times:
-            if before is None or _skips(video, keys, video.time_of(after or before), time):
+            if before is None or _skips(video, keys, (after or before)[0], time):
                 run = video.frames_from(time)
                 before, after = next(run, None), next(run, None)
-            while after is not None and video.time_of(after) <= time:
+            while after is not None and after[0] <= time:
                 before, after = after, next(run, None)
-            yield _nearer(video, before, after, time)
+            yield None if before is None else _nearer(video, before, after, time)
 
 
 def _skips(video: Video, keys: list[float], position: float, time: float) -> bool:
@@ -139,13 +158,13 @@ def _skips(video: Video, keys: list[float], position: float, time: float) -> boo
     return place > 0 and keys[place - 1] - position > WORTH_SEEKING * video.gap
 
 
-def _nearer(video: Video, before: Any, after: Any, time: float) -> Any:
-    if before is None:
-        return None
-    past = time - video.time_of(before)
+def _nearer(
+    video: Video, before: tuple[float, Any], after: tuple[float, Any] | None, time: float
+) -> Any:
+    past = time - before[0]
     if after is None:
-        return before if past < (1 - SLACK) * video.gap else None
-    return after if past > HALF * (video.time_of(after) - video.time_of(before)) else before
+        return before[1] if past < (1 - SLACK) * video.gap else None
+    return after[1] if past > HALF * (after[0] - before[0]) else before[1]
 
 
 @contextmanager

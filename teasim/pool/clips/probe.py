@@ -66,12 +66,8 @@ def version(path: Path) -> tuple[int, int]:
 def _probe(path: Path, mtime_ns: int, size: int) -> VideoInfo:
     del mtime_ns, size
     with Video(path) as video, damage_told(path):
-        times = sorted(
-            video.time_of(packet)
-            for packet in video.container.demux(video.stream)
-            if packet.size and not packet.is_discard
-        )
-        first = next(video.frames_from(0.0), None)
+        times = video.times()
+        _, first = next(video.frames_from(0.0), (None, None))
         if first is None or not times:
             raise PoolError(f"The video '{path}' holds no frame.")
         span = times[-1] - times[0]

@@ -130,6 +130,6 @@ def _first_plane(frame: Any) -> bytes:
 
 def _as_rgb(reformatter: Any, frame: Any) -> np.ndarray:
     """Return the frame as it is shown, (H, W, 3) uint8."""
-    image: np.ndarray = reformatter.reformat(frame, format="rgb24").to_ndarray()
+    image: np.ndarray = reformatter.reformat(frame, format="rgb24", threads=1).to_ndarray()
     turns = round(frame.rotation / 90) % 4
     return np.ascontiguousarray(np.rot90(image, turns)) if turns else image
