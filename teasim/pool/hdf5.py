@@ -198,7 +198,7 @@ def _digest(clip: DatasetClip, mtime_ns: int, size: int) -> str:
 
 def _form(data: Any) -> str | None:
     """Return how an array stores pictures; None if it holds none."""
-    shape = data.shape or ()
+    shape: tuple[int, ...] = data.shape or ()
     if 0 in shape:
         return None
     if data.dtype == np.uint8 and len(shape) == 4 and max(shape[1:]) <= MAX_SIDE:
@@ -232,7 +232,7 @@ def _decoded(content: bytes) -> np.ndarray:
     import av
 
     av.logging.set_level(av.logging.PANIC)  # ffmpeg's own lines would bury the one sentence
-    with av.open(io.BytesIO(content)) as box:
+    with av.open(io.BytesIO(content), "r") as box:
         size = box.streams.video[0].codec_context
         if max(size.width, size.height) > MAX_SIDE:
             raise ValueError("too large")

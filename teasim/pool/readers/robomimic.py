@@ -36,8 +36,8 @@ def open_file(path: Path, options: ReadOptions) -> RecordedSource:
     """
     files = files_in(path)
     if len(files) > 1:
-        names = ", ".join(file.name for file in files)
-        raise PoolError(f"'{path}' holds {len(files)} HDF5 files, {names}; name one of them.")
+        known = ", ".join(file.name for file in files)
+        raise PoolError(f"'{path}' holds {len(files)} HDF5 files, {known}; name one of them.")
     (place,) = files
     with opened(place) as file:
         data = group(file, "data")
@@ -197,8 +197,8 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     if not keep:
         return [f"robomimic: leave these names out of the mask you train on: {names}"]
     code = (
-        f"import h5py; h5py.File({str(root)!r}, 'a')['mask/keep'] = "
-        f"[name.encode() for name in {names!r}.split()]"
+        f'import h5py; h5py.File({json.dumps(str(root))}, "a")["mask/keep"] = '
+        f'[name.encode() for name in "{names}".split()]'
     )
     return [
         f"robomimic: python -c {shlex.quote(code)}   (writes the mask keep into the file)",

@@ -134,13 +134,15 @@ def _check_complete(
             other = max(cameras, key=lambda name: len(cameras[name]))
             raise PoolError(
                 f"The camera '{camera}' of '{root}' has no video of {_listed(missing)}; add "
-                f"what is missing, move the others away, or open one camera alone: '{root / other}'."
+                "what is missing, move the others away, or open one camera alone: "
+                f"'{root / other}'."
             )
 
 
 def _usual_rate(rates: Sequence[float]) -> float:
     """Return the rate that most files have [1/s], of equally frequent ones the lowest."""
-    return round(max(sorted(rates), key=lambda rate: sum(_same(rate, r) for r in rates)), 3)
+    frequent = max(sorted(rates), key=lambda rate: sum(_same(rate, other) for other in rates))
+    return round(frequent, 3)
 
 
 def _same(rate: float, other: float) -> bool:
