@@ -41,13 +41,7 @@ def opened(path: Path) -> Iterator[Any]:
     Raises:
         PoolError: the file is missing or damaged, or h5py is not installed.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise PoolError(
-            f"'{path}' is an HDF5 file, which h5py reads; install it with "
-            "`pip install teasim[hdf5]`."
-        ) from error
+    h5py = library(path)
     if not path.is_file():
         raise PoolError(f"The HDF5 file '{path}' is missing.")
     try:
@@ -57,6 +51,22 @@ def opened(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:  # h5py raises OSError, RuntimeError, KeyError, ValueError and more
         raise PoolError(f"The HDF5 file '{path}' is damaged and cannot be read.") from error
+
+
+def library(path: Path) -> Any:
+    """Return the module h5py.
+
+    Raises:
+        PoolError: it is not installed, so that `path` cannot be read.
+    """
+    try:
+        import h5py
+    except ImportError as error:
+        raise PoolError(
+            f"'{path}' is an HDF5 file, which h5py reads; install it with "
+            "`pip install teasim[hdf5]`."
+        ) from error
+    return h5py
 
 
 def root_names(path: Path) -> frozenset[str]:

@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool.hdf5 import DatasetClip, arrays, clips_in, files_in, group, logs_hash, opened
+from teasim.pool.hdf5 import (
+    DatasetClip,
+    arrays,
+    clips_in,
+    files_in,
+    group,
+    library,
+    logs_hash,
+    opened,
+)
 from teasim.pool.readers import aloha, minari
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.recordings import RecordedSource, Recording
@@ -35,6 +44,7 @@ def open_file(path: Path, options: ReadOptions) -> RecordedSource:
         PoolError: it is damaged, or has no pictures.
     """
     files = files_in(path)
+    library(files[0])  # without it an ALOHA folder is taken for one of robomimic files
     if len(files) > 1:
         known = ", ".join(file.name for file in files)
         raise PoolError(f"'{path}' holds {len(files)} HDF5 files, {known}; name one of them.")
