@@ -18,6 +18,9 @@ from teasim.pool.types import NO_SUBTASK
 TIME_TOLERANCE = 1e-3
 """Largest deviation of a timestamp from frame_index / fps [s]."""
 
+LENGTH_TOLERANCE = 0.9
+"""Largest difference of a video and its logs [frames]; one frame is told in spite of rounding."""
+
 NOT_NUMBERS = ("video", "image", "string", "language")
 """Kinds of features whose columns, if any, are not checked."""
 
@@ -130,29 +133,33 @@ def _unnamed(subtask_index: np.ndarray, subtasks: tuple[str, ...]) -> bool:
 
 def _check_videos(pool: Pool) -> Iterator[str]:
     for camera in pool.cameras:
-        ends: dict[Path, tuple[int, int]] = {}
+        ends: dict[Path, tuple[float, int]] = {}
         for episode in pool.episodes:
             clip = episode.clip(camera)
-            end = round(clip.start * clip.fps) + clip.length
-            ends[clip.path] = max(ends.get(clip.path, (0, 0)), (end, episode.index))
+            end = clip.start * clip.fps + clip.length
+            ends[clip.path] = max(ends.get(clip.path, (0.0, 0)), (end, episode.index))
         for path, (end, last) in ends.items():
             yield from _sentences(partial(_check_video, pool, path, end, last))
 
 
-def _check_video(pool: Pool, path: Path, end: int, last: int) -> Iterator[str]:
-    """One mp4: it decodes, and it is as long as the logs of the demonstrations in it."""
+def _check_video(pool: Pool, path: Path, end: float, last: int) -> Iterator[str]:
+    """One video: it decodes, and it lasts as long as the logs of the demonstrations in it.
+
+    Lengths are compared in frames of the pool, because a camera may have a rate of its own.
+    """
     name = path.relative_to(pool.root).as_posix()
     known = name in pool.manifest.get("sha256", {})
     n_frames = probe(path).n_frames if known else check_decodable(path)
-    if n_frames < end:
+    shown = n_frames * pool.fps / probe(path).fps
+    if end - shown > LENGTH_TOLERANCE:
         yield (
-            f"The video '{path}' is shorter than the log: it has {n_frames} frames but "
-            f"demonstration {last} ends at frame {end}."
+            f"The video '{path}' is shorter than the log: it has {shown:.0f} frames but "
+            f"demonstration {last} ends at frame {end:.0f}."
         )
-    if n_frames > end:
+    if shown - end > LENGTH_TOLERANCE:
         yield (
             f"The log of demonstration {last} is shorter than its video '{path}': it ends at frame "
-            f"{end} of {n_frames}."
+            f"{end:.0f} of {shown:.0f}."
         )
 
 

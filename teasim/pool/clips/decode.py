@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from teasim.common.errors import PoolError
-from teasim.pool.clips.order import MAX_SIDE
+from teasim.pool.clips.order import check_size
 
 HALF = 0.55
 """Share of the gap between two frames after which the later one is taken.
@@ -117,8 +117,7 @@ class Video:
                 time = self._time_of(frame)
                 if jumped and (time < first or frame.is_corrupt):
                     continue
-                if max(frame.width, frame.height) > MAX_SIDE:
-                    raise _too_large(self.path, frame.width, frame.height)
+                check_size(self.path, frame.width, frame.height)
                 yield time, frame
 
     def _time_of(self, stamped: Any) -> float:
@@ -183,13 +182,6 @@ def damaged(path: Path) -> PoolError:
     return PoolError(f"The video '{path}' is damaged and cannot be decoded.")
 
 
-def _too_large(path: Path, width: int, height: int) -> PoolError:
-    return PoolError(
-        f"The frames of the video '{path}' are {width} x {height} pixels; at most "
-        f"{MAX_SIDE} x {MAX_SIDE} are read."
-    )
-
-
 def _open_container(path: Path) -> Any:
     import av
 
@@ -203,14 +195,19 @@ def _open_container(path: Path) -> Any:
 
 
 def _video_stream(path: Path, container: Any) -> Any:
-    if not container.streams.video:
-        container.close()
+    import av
+
+    cover = av.stream.Disposition.attached_pic
+    streams = [stream for stream in container.streams.video if not stream.disposition & cover]
+    if not streams:
         raise PoolError(f"The file '{path}' holds no video.")
-    stream = container.streams.video[0]
-    width, height = stream.codec_context.width, stream.codec_context.height
-    if max(width, height) > MAX_SIDE:
-        container.close()
-        raise _too_large(path, width, height)
+    stream = streams[0]
+    if stream.codec_context is None:
+        raise PoolError(
+            f"The video '{path}' is damaged or in a codec that PyAV cannot decode; "
+            f"teasim doctor tells which ones it can."
+        )
+    check_size(path, stream.codec_context.width, stream.codec_context.height)
     stream.thread_type = "NONE"  # the worker processes are the parallelism
     stream.codec_context.thread_count = 1
     return stream

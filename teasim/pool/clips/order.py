@@ -1,13 +1,18 @@
 """What clips of every kind share: selections of frames in any order."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from teasim.common.errors import PoolError
 from teasim.pool.source import Clip
 
 MAX_SIDE = 8192
 """Largest width and height of a frame [pixels]; 8K video is 7680 x 4320."""
+
+DIGEST_FRAMES = 8
+"""Number of frames, spread evenly from the first to the last, that enter a digest."""
 
 
 def gather(clip: Clip, indices: Sequence[int] | np.ndarray) -> np.ndarray:
@@ -46,6 +51,32 @@ def ascending(clip: Clip, indices: Sequence[int] | np.ndarray) -> np.ndarray:
     return wanted
 
 
-def sample(length: int, count: int) -> np.ndarray:
-    """Return at most `count` frame numbers spread evenly from the first frame to the last."""
-    return np.unique(np.linspace(0, length - 1, count).round().astype(np.int64))
+def digest_sample(length: int) -> np.ndarray:
+    """Return the ascending numbers of the frames that enter the digest of `length` frames."""
+    return np.unique(np.linspace(0, length - 1, DIGEST_FRAMES).round().astype(np.int64))
+
+
+def check_size(path: Path, width: int, height: int) -> None:
+    """Refuse frames that are too large, before memory is allocated for them.
+
+    Raises:
+        PoolError: A side is longer than `MAX_SIDE`.
+    """
+    if max(width, height) > MAX_SIDE:
+        raise PoolError(
+            f"The frames in '{path}' are {width} x {height} pixels; at most "
+            f"{MAX_SIDE} x {MAX_SIDE} are read."
+        )
+
+
+def file_version(path: Path, kind: str) -> tuple[int, int]:
+    """Return time of change [ns] and size [bytes], which tell caches that a file has changed.
+
+    Raises:
+        PoolError: The file is missing; `kind` says what it is, e.g. 'video'.
+    """
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise PoolError(f"The {kind} '{path}' is missing.") from error
+    return status.st_mtime_ns, status.st_size

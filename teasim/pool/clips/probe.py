@@ -6,6 +6,7 @@ from pathlib import Path
 
 from teasim.common.errors import PoolError
 from teasim.pool.clips.decode import Video, damage_told
+from teasim.pool.clips.order import file_version
 
 
 @dataclass(frozen=True)
@@ -46,20 +47,7 @@ def probe(path: Path) -> VideoInfo:
     Raises:
         PoolError: The file is missing, damaged, or holds no video.
     """
-    return _probe(path, *version(path))
-
-
-def version(path: Path) -> tuple[int, int]:
-    """Return time of change [ns] and size [bytes], which tell caches that a file has changed.
-
-    Raises:
-        PoolError: The file is missing.
-    """
-    try:
-        status = path.stat()
-    except OSError as error:
-        raise PoolError(f"The video '{path}' is missing.") from error
-    return status.st_mtime_ns, status.st_size
+    return _probe(path, *file_version(path, "video"))
 
 
 @lru_cache(maxsize=64)

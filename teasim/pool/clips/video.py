@@ -11,11 +11,8 @@ import numpy as np
 
 from teasim.common.errors import PoolError
 from teasim.pool.clips.decode import damage_told, nearest_frames
-from teasim.pool.clips.order import ascending, gather, sample
-from teasim.pool.clips.probe import probe, version
-
-DIGEST_FRAMES = 8
-"""Number of frames, spread evenly, that `VideoClip.digest` decodes."""
+from teasim.pool.clips.order import ascending, digest_sample, file_version, gather
+from teasim.pool.clips.probe import probe
 
 
 @dataclass(frozen=True)
@@ -68,13 +65,14 @@ class VideoClip:
         """Return a hash of the decoded pictures.
 
         It is made of the length, the size and the first plane (luma; codecs define it to the bit,
-        unlike its conversion to RGB) of `DIGEST_FRAMES` frames, so it survives a new container
-        and rewritten packets.
+        unlike its conversion to RGB) of `order.DIGEST_FRAMES` frames, so it survives a new
+        container and rewritten packets. Of mpeg4 and mjpeg another build of ffmpeg may decode
+        other last bits.
 
         Raises:
             PoolError: The file is missing or damaged, or ends before the demonstration does.
         """
-        return _digest(self, *version(self.path))
+        return _digest(self, *file_version(self.path, "video"))
 
     def mp4(self) -> bytes | None:
         """Return the file's bytes if it holds exactly these frames as h264 that browsers play.
@@ -112,7 +110,7 @@ class VideoClip:
 def _digest(clip: VideoClip, mtime_ns: int, size: int) -> str:
     del mtime_ns, size
     content = hashlib.sha256(f"video {clip.length}\n".encode())
-    for _, frame in clip._decoded(sample(clip.length, DIGEST_FRAMES)):
+    for _, frame in clip._decoded(digest_sample(clip.length)):
         with damage_told(clip.path):
             content.update(f"{frame.width} {frame.height}\n".encode())
             content.update(_first_plane(frame))

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from teasim.common.errors import PoolError
-from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash, opened, root_names
+from teasim.pool.clips.hdf5 import opened
+from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash, root_names
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.readers.videos import natural
 from teasim.pool.recordings import RecordedSource, Recording

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from teasim.common.errors import PoolError
-from teasim.pool.hdf5 import arrays, clips_in, group, logs_hash, opened
+from teasim.pool.clips.hdf5 import opened
+from teasim.pool.hdf5 import arrays, clips_in, group, logs_hash
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.recordings import RecordedSource, Recording
 
