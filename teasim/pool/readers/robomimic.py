@@ -14,7 +14,7 @@ from teasim.pool.clips.hdf5 import library, opened
 from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash
 from teasim.pool.readers import aloha, minari
 from teasim.pool.readers.reader import Reader, ReadOptions
-from teasim.pool.recordings import RecordedSource, Recording
+from teasim.pool.recordings import RecordedSource, Recording, unreadable
 from teasim.pool.source import Clip
 from teasim.pool.types import Span
 
@@ -209,4 +209,9 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     ]
 
 
-READER = Reader("robomimic file", recognises, open_file, ("fps", "mask"))
+def check(path: Path) -> list[str]:
+    """Decode every picture and return a sentence for each damage."""
+    return unreadable(lambda: open_file(path, ReadOptions()))
+
+
+READER = Reader("robomimic file", recognises, open_file, check, options=("fps", "mask"))
