@@ -212,11 +212,15 @@ def test_a_picture_that_does_not_decode_is_found(
 
 def test_a_mask_and_the_notes_of_a_robomimic_file(inputs: dict[str, Path]) -> None:
     source = open_source(inputs["robomimic"], ReadOptions(mask="train"))
-    assert [(demo.index, demo.name) for demo in source.episodes] == [(0, "demo_0"), (2, "demo_2")]
+    assert [(demo.index, demo.name) for demo in source.episodes] == [
+        (0, "demo_0"),
+        (2, "demo_2"),
+        (3, "demo_3"),
+    ]
     assert source.entries([2]) == ["demo_2"]
     assert source.cameras == ("agentview_image", "wrist_rgb")
     assert source.fps == 10
-    assert source.notes == ("'demo.hdf5' has masks, with --mask NAME only one is read: train (2).",)
+    assert source.notes == ("'demo.hdf5' has masks, with --mask NAME only one is read: train (3).",)
 
 
 def test_the_kept_ones_become_a_mask(inputs: dict[str, Path], tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip, VideoInfo, probe
 from teasim.pool.readers.reader import Reader, ReadOptions
-from teasim.pool.recordings import RecordedSource, Recording, unreadable
+from teasim.pool.recordings import RecordedSource, Recording, listed, unreadable
 
 SUFFIXES = frozenset(
     [
@@ -32,14 +32,14 @@ SHOWN = 3
 
 def is_video(path: Path) -> bool:
     """Tell whether the name of a file says that it is a video."""
-    return path.suffix.lower() in SUFFIXES and path.name[0] != "." and path.is_file()
+    return path.suffix.lower() in SUFFIXES and path.is_file()
 
 
 def recognises(path: Path) -> bool:
     """Tell whether `path` is a video, or a folder with videos or with folders of videos."""
     if not path.is_dir():
         return is_video(path)
-    return any(is_video(file) for folder in (path, *_folders(path)) for file in folder.iterdir())
+    return any(is_video(file) for folder in (path, *_folders(path)) for file in listed(folder))
 
 
 def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
@@ -111,7 +111,7 @@ def _cameras(root: Path) -> dict[str, dict[str, Path]]:
 
 def _videos(folder: Path) -> dict[str, Path]:
     found: dict[str, Path] = {}
-    for file in sorted(filter(is_video, folder.iterdir())):
+    for file in filter(is_video, listed(folder)):
         other = found.setdefault(file.stem, file)
         if other != file:
             raise PoolError(
@@ -121,8 +121,7 @@ def _videos(folder: Path) -> dict[str, Path]:
 
 
 def _folders(root: Path) -> list[Path]:
-    found = (path for path in root.iterdir() if path.is_dir() and path.name[0] != ".")
-    return sorted(found, key=lambda path: natural(path.name))
+    return sorted(filter(Path.is_dir, listed(root)), key=lambda path: natural(path.name))
 
 
 def _check_complete(
@@ -182,8 +181,8 @@ def _notes(
     ignored = sorted(
         str(file.relative_to(root))
         for place in places
-        for file in place.iterdir()
-        if file.is_file() and file.name[0] != "." and not is_video(file)
+        for file in listed(place)
+        if file.is_file() and not is_video(file)
     )
     if ignored:
         notes.append(f"Files of '{root}' that are no videos are left out: {_listed(ignored)}.")
