@@ -33,5 +33,5 @@ def test_an_option_that_the_format_does_not_know(
     path = made.ms_tcn(tmp_path / "in")
     assert main([str(path), "-o", str(tmp_path / "out"), "--mask", "train"]) == 2
     assert capsys.readouterr().err == (
-        f"teasim: '{path}' is read as MS-TCN folder, which has no use for mask; leave it out.\n"
+        f"teasim: The option mask does not apply to '{path}' (MS-TCN folder); leave it out.\n"
     )

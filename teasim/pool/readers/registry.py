@@ -34,7 +34,7 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
     for name in options.given():
         if name not in reader.options:
             raise ConfigError(
-                f"'{place}' is read as {reader.name}, which has no use for {name}; leave it out."
+                f"The option {name} does not apply to '{place}' ({reader.name}); leave it out."
             )
     return reader.open(place, options)
 

@@ -145,7 +145,7 @@ def _mask_notes(path: Path, file: Any) -> list[str]:
     ]
     if not masks:
         return []
-    return [f"'{path.name}' has masks, with --mask NAME only one is read: {', '.join(masks)}."]
+    return [f"'{path.name}' has masks, of which --mask NAME reads one: {', '.join(masks)}."]
 
 
 def _masked(path: Path, file: Any, mask: str, names: Sequence[str]) -> list[str]:
@@ -172,8 +172,8 @@ def _rate(path: Path, data: Any, options: ReadOptions) -> tuple[float, list[str]
     if options.fps is not None:
         return options.fps, []
     return DEFAULT_FPS, [
-        f"'{path.name}' does not store its frame rate; {DEFAULT_FPS:g} per second are assumed, "
-        "--fps says otherwise."
+        f"'{path.name}' does not store its frame rate; {DEFAULT_FPS:g} Hz is assumed, set --fps to "
+        "change it."
     ]
 
 

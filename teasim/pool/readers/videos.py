@@ -174,8 +174,8 @@ def _notes(
     others = Counter(f"{i.fps:.4g}" for i in infos.values() if not _same(i.fps, fps))
     if others:
         notes.append(
-            f"{sum(others.values())} videos of '{root}' have another rate ({', '.join(others)}) "
-            f"than most; they are read at {fps:g} frames per second."
+            f"Not all videos of '{root}' have the same rate: {sum(others.values())} of {len(infos)} "
+            f"are at {', '.join(others)} Hz and are read at {fps:g} Hz."
         )
     places = [root, *(_folders(root) if len(cameras) > 1 or CAMERA not in cameras else ())]
     ignored = sorted(
