@@ -200,8 +200,9 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     if not keep:
         return [f"robomimic: leave these names out of the mask you train on: {names}"]
     code = (
-        f'import h5py; h5py.File({json.dumps(str(root))}, "a")["mask/keep"] = '
-        f'[name.encode() for name in "{names}".split()]'
+        f'import h5py; file = h5py.File({json.dumps(str(root))}, "a"); '
+        f'file.pop("mask/keep", None); '
+        f'file["mask/keep"] = [name.encode() for name in "{names}".split()]'
     )
     return [
         f"robomimic: python -c {shlex.quote(code)}   (writes the mask keep into the file)",

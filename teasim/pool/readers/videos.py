@@ -174,8 +174,8 @@ def _notes(
     others = Counter(f"{i.fps:.4g}" for i in infos.values() if not _same(i.fps, fps))
     if others:
         notes.append(
-            f"Not all videos of '{root}' have the same rate: {sum(others.values())} of {len(infos)} "
-            f"are at {', '.join(others)} Hz and are read at {fps:g} Hz."
+            f"Not all videos of '{root}' have the same rate: {sum(others.values())} of "
+            f"{len(infos)} are at {', '.join(others)} Hz and are read at {fps:g} Hz."
         )
     places = [root, *(_folders(root) if len(cameras) > 1 or CAMERA not in cameras else ())]
     ignored = sorted(
