@@ -23,6 +23,7 @@ from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
 from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
+from teasim.pool.soundness import require_sound
 from teasim.pool.source import Source
 from teasim.pool.weight_table import WeightRow
 
@@ -101,6 +102,7 @@ class DemoFilter:
         """
         self.timings_ = {}
         self._check(pool)
+        require_sound(pool)
         self.cameras_ = self._cameras(pool)
         with self._timed("segments"):
             self.segments_ = self._segments(pool, jobs)

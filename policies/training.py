@@ -17,6 +17,7 @@ from policies.learners.registry import LEARNERS, LearnerKind, find_learner
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder
 from teasim.pool import Pool
+from teasim.pool.soundness import require_sound
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,7 @@ def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int =
     kind = find_learner(config.learner, config.level)
     demos = DemosConfig(observe=config.observe)
     pool = Pool.open(pool_path)
+    require_sound(pool)
     weights = demo_weights(pool, config.weights, config.use)
     settings = expert_settings(kind, pool, config)
     check_new_folder(run)

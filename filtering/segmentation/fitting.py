@@ -40,6 +40,7 @@ from teasim.pool.mstcn import (
     write_predictions,
 )
 from teasim.pool.readers.registry import open_source
+from teasim.pool.soundness import require_sound
 from teasim.pool.source import Demonstration, Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
@@ -101,6 +102,7 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
     """
     pool = open_source(source)
     check_new_folder(out)
+    require_sound(pool)
     frames = FrameSource(chosen_cameras(pool, config.cameras) or pool.cameras, config.rate)
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
@@ -165,6 +167,7 @@ def predict(segmenter_folder: Path, source: Path, out: Path, *, jobs: int = 1) -
 
 
 def _predict_pool(segmenter: MSTCNSegmenter, pool: Source, out: Path, jobs: int) -> Scores:
+    require_sound(pool)
     found = segmenter.segment(pool, jobs=jobs)
     assert found.posteriors is not None
     scores = score_episodes(pool.episodes, found)

@@ -14,7 +14,7 @@ from policies.data.moments import Moments
 from policies.data.samples import DecisionSamples
 from teasim.common.errors import ConfigError
 from teasim.pool import Pool
-from teasim.pool.weight_table import WeightRow, read_weight_table
+from teasim.pool.weight_table import WeightRow, match_rows, read_weight_table
 
 USES = ("discard", "weight", "ignore")
 """`discard` drops flagged demonstrations, `weight` takes each at its weight, `ignore` takes all."""
@@ -66,8 +66,8 @@ def _rank(row: WeightRow) -> tuple[bool, float, float]:
 
 def _rows_of(pool: Pool, table: Path) -> list[WeightRow]:
     """Rows of `table` in the order of the demonstrations of `pool`."""
-    rows = {row.demo_id: row for row in read_weight_table(table)}
-    missing = [episode for episode in pool.episodes if episode.demo_id not in rows]
+    rows = match_rows(read_weight_table(table), [episode.demo_id for episode in pool.episodes])
+    missing = [e for e, row in zip(pool.episodes, rows, strict=True) if row is None]
     if len(missing) == len(pool.episodes):
         raise ConfigError(
             f"The weight table '{table}' is for another pool: "
@@ -78,7 +78,7 @@ def _rows_of(pool: Pool, table: Path) -> list[WeightRow]:
             f"The weight table '{table}' lacks {len(missing)} of the {len(pool.episodes)} "
             f"demonstrations of '{pool.root}', the first is episode {missing[0].index}."
         )
-    return [rows[episode.demo_id] for episode in pool.episodes]
+    return [row for row in rows if row is not None]
 
 
 def _weight(row: WeightRow, use: str) -> float:

@@ -143,6 +143,13 @@ class Source(Protocol):
     def episodes(self) -> Sequence[Demonstration]:
         """The demonstrations in the order of their index."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what is unusual but harms no demonstration; verbs print them as warnings."""
+
+    def problems(self) -> list[str]:
+        """Return a sentence for each damage that shows without decoding a picture."""
+
     def content_hash(self) -> str:
         """Return a hash of all that a filter may read; what is known to be correct stays out.
 

@@ -219,7 +219,7 @@ def test_unknown_names_are_answered_with_the_choices(toy_pool: Pool) -> None:
         (lambda root: root.mkdir(), "There is no pool at '{root}': the folder is empty."),
         (
             lambda root: (root / "a" / "b").mkdir(parents=True),
-            "There is no pool at '{root}': a LeRobot v3.0 data set has the file meta/info.json.",
+            "There is no pool at '{root}': a LeRobot data set has the file meta/info.json.",
         ),
         (
             lambda root: (root / ".incomplete" / "episode-000003").mkdir(parents=True),
@@ -242,7 +242,8 @@ def test_a_path_without_a_pool_is_told(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"codebase_version": "v2.1"}, "has LeRobot format v2.1; only v3.0 can be read"),
+        ({"codebase_version": "v1.6"}, "has LeRobot format v1.6; v2.0, v2.1 and v3.0 can be read"),
+        ({"codebase_version": "v2.1"}, "meta/episodes.jsonl' is missing."),
         ({"fps": 0}, "is damaged: fps is 0, not a positive number."),
         ({"fps": "10"}, "is damaged: fps is 10, not a positive number."),
         ({"features": []}, "is damaged: 'features' is not readable."),

@@ -46,7 +46,7 @@ class ImageClip:
     def stream(self, indices: Sequence[int] | np.ndarray) -> Iterator[np.ndarray]:
         """Yield the frames `indices`, which ascend; see `teasim.pool.source.Clip`."""
         wanted, shape = ascending(self, indices), None
-        for index, content in zip(wanted.tolist(), self._stored(wanted), strict=True):
+        for index, content in zip(wanted.tolist(), self.stored(wanted), strict=True):
             image = _decoded(content, self.path, f"'{self.name}' of frame {index}")
             if shape not in (None, image.shape):
                 raise PoolError(f"The pictures '{self.name}' of '{self.path}' differ in size.")
@@ -64,7 +64,7 @@ class ImageClip:
     def mp4(self) -> None:
         """Return nothing: no mp4 is stored."""
 
-    def _stored(self, wanted: np.ndarray) -> Iterator[bytes]:
+    def stored(self, wanted: np.ndarray) -> Iterator[bytes]:
         """Yield the encoded pictures `wanted`, which ascend."""
         parquet = self.path.suffix == ".parquet"
         read = _from_parquet if parquet else _from_hdf5
@@ -123,6 +123,8 @@ def _decoded(content: bytes, path: Path, what: str) -> np.ndarray:
     """Return an encoded picture as (H, W, 3) uint8 RGB."""
     from PIL import Image, UnidentifiedImageError
 
+    if not isinstance(content, bytes):
+        raise PoolError(f"The picture {what} in '{path}' is damaged or missing.")
     try:
         with Image.open(io.BytesIO(content), formats=FORMATS) as image:
             check_size(path, *image.size)
@@ -137,6 +139,6 @@ def _decoded(content: bytes, path: Path, what: str) -> np.ndarray:
 def _digest(clip: ImageClip, mtime_ns: int, size: int) -> str:
     del mtime_ns, size
     content = hashlib.sha256(f"images {clip.length}\n".encode())
-    for stored in clip._stored(digest_sample(clip.length)):
+    for stored in clip.stored(digest_sample(clip.length)):
         content.update(hashlib.sha256(stored).digest())
     return content.hexdigest()

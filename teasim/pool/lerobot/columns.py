@@ -10,6 +10,11 @@ import pyarrow.parquet as pq
 
 from teasim.common.errors import PoolError
 
+MOST_ROWS = 50_000_000
+"""Most rows of a file that is read: 450 hours at 30 frames per second."""
+MOST_WHOLE = 2.0**53
+"""Largest whole number that a float holds exactly."""
+
 
 def read_table(
     path: Path,
@@ -25,6 +30,8 @@ def read_table(
         raise PoolError(f"The file '{path}' is missing.")
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            if file.metadata.num_rows > MOST_ROWS:
+                raise PoolError(f"The file '{path}' has more than {MOST_ROWS} rows.")
             present: list[str] = file.schema_arrow.names
             for name in columns or ():
                 if name not in present:
@@ -63,6 +70,24 @@ def _read_column(path: Path, name: str, mtime_ns: int, size: int) -> pa.ChunkedA
     return read_table(path, [name])[name]
 
 
+def read_columns(path: Path, names: tuple[str, ...]) -> pa.Table:
+    """Some columns of a parquet file; the last few answers are kept.
+
+    Raises:
+        PoolError: The file is missing or damaged, or lacks a column.
+    """
+    if not path.is_file():
+        raise PoolError(f"The file '{path}' is missing.")
+    status = path.stat()
+    return _read_columns(path, names, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=4)
+def _read_columns(path: Path, names: tuple[str, ...], mtime_ns: int, size: int) -> pa.Table:
+    del mtime_ns, size
+    return read_table(path, names)
+
+
 def as_numpy(column: pa.ChunkedArray, name: str = "column") -> np.ndarray:
     """Numbers of an Arrow column: (n,) for scalars, (n, D) for vectors of one length.
 
@@ -81,4 +106,33 @@ def as_numpy(column: pa.ChunkedArray, name: str = "column") -> np.ndarray:
     if len(lengths) > 1:
         raise PoolError(f"The vectors of column '{name}' differ in length.")
     values = as_numpy(pa.chunked_array([flat]), name)
-    return values.reshape(len(array), *values.shape[1:], -1) if len(array) else values
+    width = int(lengths[0]) if len(array) else 0
+    return values.reshape(len(array), width, *values.shape[1:]) if len(array) else values
+
+
+def numbers(column: pa.ChunkedArray, name: str) -> np.ndarray:
+    """Numbers of a column of scalars, (n,); some writers store each as a list of one.
+
+    Raises:
+        PoolError: A value is missing or no single number.
+    """
+    values = as_numpy(column, name)
+    if values.dtype.kind not in "iufb" or values.size != len(column):
+        raise PoolError(f"The column '{name}' does not hold one number per row.")
+    return values.reshape(len(column))
+
+
+def whole_numbers(column: pa.ChunkedArray, name: str) -> np.ndarray:
+    """Whole numbers of a column, (n,) int64; a round trip through pandas makes floats of them.
+
+    Raises:
+        PoolError: A value is missing, no number, or has a fraction.
+    """
+    values = numbers(column, name)
+    if values.dtype.kind == "b":
+        raise PoolError(f"The column '{name}' does not hold one number per row.")
+    if values.dtype.kind == "f":
+        wrong = ~(np.abs(values) <= MOST_WHOLE) | (values != np.floor(values))
+        if wrong.any():
+            raise PoolError(f"The column '{name}' holds {values[wrong][0]}, no whole number.")
+    return values.astype(np.int64)

@@ -206,6 +206,7 @@ class _Assembly:
             "format": MANIFEST_FORMAT,
             "version": MANIFEST_VERSION,
             **self.header.as_json(),
+            "features": sorted(self.features),
             "episodes": [
                 {"episode_index": i, "demo_id": e.demo_id} | record_as_json(e.record)
                 for i, e in enumerate(self.episodes)

@@ -1,4 +1,4 @@
-"""Names and places of a LeRobotDataset v3.0 with one data file and one mp4 per demonstration."""
+"""Names and places in a LeRobotDataset; ours have a data file and an mp4 per demonstration."""
 
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ SUBTASKS = Path("meta/subtasks.parquet")
 TEMPORAL_PROPORTIONS = Path("meta/temporal_proportions_sparse.json")
 EPISODES_FOLDER = Path("meta/episodes")
 EPISODES = EPISODES_FOLDER / "chunk-000/file-000.parquet"
+EPISODES_LINES = Path("meta/episodes.jsonl")
+TASKS_LINES = Path("meta/tasks.jsonl")
 MANIFEST = Path("teasim/manifest.json")
 STAGING = Path(".incomplete")
 
@@ -22,10 +24,18 @@ DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 
 CAMERA_PREFIX = "observation.images."
+OBSERVATION_PREFIX = "observation."
 STATE = "observation.state"
 ACTION = "action"
 ENVIRONMENT_STATE = "observation.environment_state"
 SUBTASK_INDEX = "subtask_index"
+LANGUAGE = "language_persistent"
+"""What is said about the parts of a demonstration, since LeRobot 0.6."""
+SCALARS = (
+    *("timestamp", "frame_index", "episode_index", "index", "task_index", SUBTASK_INDEX),
+    *("next.reward", "next.done", "next.success", "next.truncated"),
+)
+"""Columns with one value per frame; some writers store each as a list of one."""
 
 NO_SUBTASK_NAME = "none"
 """Last row of `subtasks.parquet`: readers that index it by position find it under -1."""

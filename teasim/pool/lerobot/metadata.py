@@ -1,7 +1,6 @@
 """What a pool says about itself: info.json, the manifest, and the episodes table, checked."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,24 +8,24 @@ from typing import Any
 
 from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
-from teasim.pool.lerobot.columns import read_table
-
-Row = Mapping[str, Any]
-"""A demonstration's row of the episodes table, without its statistics."""
-
-EPISODE_COLUMNS = (
-    "episode_index",
-    "length",
-    "data/chunk_index",
-    "data/file_index",
-    "dataset_from_index",
-    "dataset_to_index",
+from teasim.pool.lerobot.cameras import camera_keys, depth_keys
+from teasim.pool.lerobot.documents import read_json, read_lines
+from teasim.pool.lerobot.episode_table import (
+    EpisodeTable,
+    Row,
+    read_json_episodes,
+    read_parquet_episodes,
 )
+from teasim.pool.lerobot.names import names_by_number
+from teasim.pool.lerobot.places import filled, inside
+
+FASTEST = 1e6
+"""No data set has more frames per second."""
 
 
 @dataclass(frozen=True)
 class Metadata:
-    """What info.json and the manifest say about all demonstrations."""
+    """What info.json, the manifest and the episodes table say."""
 
     root: Path
     """Folder of the pool."""
@@ -34,8 +33,8 @@ class Metadata:
     """meta/info.json."""
     manifest: Mapping[str, Any]
     """teasim/manifest.json; empty for a foreign data set."""
-    subtasks: tuple[str, ...]
-    """Names in the order of subtask_index; empty when unknown."""
+    episodes: EpisodeTable
+    """The demonstrations."""
 
     @property
     def fps(self) -> int | float:
@@ -43,42 +42,113 @@ class Metadata:
         fps: int | float = self.info["fps"]
         return fps
 
+    @property
+    def features(self) -> Mapping[str, Any]:
+        """What is stored of each frame: kind and shape by key."""
+        features: Mapping[str, Any] = self.info["features"]
+        return features
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether the demonstrations are listed in JSON lines and have files of their own."""
+        return _has_lines(self.info)
+
     @cached_property
-    def video_keys(self) -> dict[str, str]:
+    def cameras(self) -> dict[str, str]:
         """Feature key of each camera by its short name."""
-        features = self.info["features"]
-        keys = [key for key, spec in features.items() if spec["dtype"] == "video"]
-        return {key.removeprefix(layout.CAMERA_PREFIX): key for key in keys}
+        return camera_keys(self.features)
+
+    @cached_property
+    def videos(self) -> tuple[str, ...]:
+        """Keys of the cameras whose pictures are in video files."""
+        keys = self.cameras.values()
+        return tuple(key for key in keys if self.features[key]["dtype"] == "video")
+
+    @cached_property
+    def tasks(self) -> Mapping[int, str]:
+        """The tasks by their number, empty where there is no list of them.
+
+        Raises:
+            PoolError: The list is damaged.
+        """
+        if not (self.root / layout.TASKS_LINES).exists():
+            return names_by_number(self.root / layout.TASKS, "task_index")
+        lines = read_lines(self.root / layout.TASKS_LINES)
+        return {
+            line["task_index"]: str(line.get("task", ""))
+            for line in lines
+            if isinstance(line.get("task_index"), int)
+        }
 
     def data_path(self, row: Row) -> Path:
-        """Data file of the demonstration described by `row` of the episodes table."""
-        return self.root / _filled(
-            self.info["data_path"],
-            chunk_index=row["data/chunk_index"],
-            file_index=row["data/file_index"],
-        )
+        """Return the data file of the demonstration described by `row`.
+
+        Raises:
+            PoolError: The path leads out of the data set.
+        """
+        place = {name: row[f"data/{name}"] for name in _PLACE if f"data/{name}" in row}
+        return self._path(self.info["data_path"], row, place)
 
     def video_path(self, row: Row, key: str) -> Path:
-        """The mp4 of video feature `key` of the demonstration described by `row`."""
-        return self.root / _filled(
-            self.info.get("video_path") or layout.VIDEO_PATH,
-            video_key=key,
-            chunk_index=row[f"videos/{key}/chunk_index"],
-            file_index=row[f"videos/{key}/file_index"],
-        )
+        """Return the video of feature `key` of the demonstration described by `row`.
+
+        Raises:
+            PoolError: The path leads out of the data set.
+        """
+        names = [name for name in _PLACE if f"videos/{key}/{name}" in row]
+        place = {name: row[f"videos/{key}/{name}"] for name in names}
+        template = self.info.get("video_path") or layout.VIDEO_PATH
+        return self._path(template, row, {"video_key": key, **place})
+
+    def _path(self, template: str, row: Row, values: Mapping[str, int | str]) -> Path:
+        index = int(row["episode_index"])
+        chunk = index // self.info.get("chunks_size", layout.CHUNK_SIZE)
+        numbers = {"episode_index": index, "episode_chunk": chunk}
+        return inside(self.root, filled(template, {**numbers, **values}))
 
 
-def read_metadata(root: Path) -> tuple[Metadata, tuple[Row, ...]]:
-    """Everything but logs and videos: what all demonstrations share, and a row for each.
+_PLACE = ("chunk_index", "file_index")
+
+
+def read_metadata(root: Path) -> Metadata:
+    """Read everything but logs and videos.
 
     Raises:
         PoolError: There is no pool at `root`, it is empty, or its metadata are damaged.
     """
     require_pool_folder(root)
     info = _read_info(root)
-    rows = _episode_rows(root, info)
-    manifest = _read_manifest(root)
-    return Metadata(root, info, manifest, _subtask_names(root, manifest, rows)), tuple(rows)
+    keys = [
+        k for k in camera_keys(info["features"]).values() if info["features"][k]["dtype"] == "video"
+    ]
+    episodes = read_json_episodes(root) if _has_lines(info) else read_parquet_episodes(root, keys)
+    meta = Metadata(root, info, _read_manifest(root), episodes)
+    first = episodes.row(0)
+    meta.data_path(first)  # a template that is no path is told when the pool is opened
+    for key in keys:
+        meta.video_path(first, key)
+    return meta
+
+
+def metadata_notes(meta: Metadata) -> list[str]:
+    """Return what a reader of the metadata should know that harms no demonstration."""
+    notes = [f"The depth camera '{key}' is left out." for key in depth_keys(meta.features)]
+    counted = {
+        "total_episodes": len(meta.episodes),
+        "total_frames": int(meta.episodes.numbers["length"].sum()),
+    }
+    notes += [
+        f"'{layout.INFO}' says {name} is {meta.info.get(name)} but the episodes table has {count}."
+        for name, count in counted.items()
+        if meta.info.get(name) != count
+    ]
+    index = meta.episodes.numbers["episode_index"]
+    if index[-1] != len(index) - 1:
+        notes.append(
+            f"The demonstrations are not numbered 0 to {len(index) - 1} without a gap; LeRobot's "
+            "own tools need that."
+        )
+    return notes
 
 
 def require_pool_folder(root: Path) -> None:
@@ -101,44 +171,55 @@ def require_pool_folder(root: Path) -> None:
         )
     if not any(root.iterdir()):
         raise PoolError(f"There is no pool at '{root}': the folder is empty.")
-    raise PoolError(
-        f"There is no pool at '{root}': a LeRobot v3.0 data set has the file {layout.INFO}."
-    )
+    raise PoolError(f"There is no pool at '{root}': a LeRobot data set has the file {layout.INFO}.")
 
 
 def _read_info(root: Path) -> Mapping[str, Any]:
     """meta/info.json, checked for what the reader relies on."""
     path = root / layout.INFO
-    info = _read_json(path)
-    version = str(info.get("codebase_version"))
-    if not version.startswith("v3."):
+    info = read_json(path)
+    version = info.get("codebase_version")
+    if not isinstance(version, str) or not version.startswith(("v2.", "v3.")):
         raise PoolError(
-            f"The data set '{root}' has LeRobot format {version}; only v3.0 can be read, so "
-            f"convert it first."
+            f"The data set '{root}' has LeRobot format {version}; v2.0, v2.1 and v3.0 can be "
+            "read, so convert it with LeRobot first."
         )
     fps = info.get("fps")
-    if isinstance(fps, bool) or not isinstance(fps, int | float) or not 0 < fps < 1e6:
+    if isinstance(fps, bool) or not isinstance(fps, int | float) or not 0 < fps < FASTEST:
         raise PoolError(f"The file '{path}' is damaged: fps is {fps}, not a positive number.")
     features = info.get("features")
-    if not isinstance(features, dict) or not all(_is_feature(spec) for spec in features.values()):
+    if not isinstance(features, dict) or not all(map(_is_feature, features.values())):
         raise PoolError(f"The file '{path}' is damaged: 'features' is not readable.")
+    _check_paths(path, info)
+    return info
+
+
+def _has_lines(info: Mapping[str, Any]) -> bool:
+    return str(info["codebase_version"]).startswith("v2.")
+
+
+def _check_paths(path: Path, info: Mapping[str, Any]) -> None:
     if not isinstance(info.get("data_path"), str):
         raise PoolError(f"The file '{path}' is damaged: it has no 'data_path'.")
-    return info
+    if not isinstance(info.get("video_path"), str | None):
+        raise PoolError(f"The file '{path}' is damaged: 'video_path' is no text.")
+    size = info.get("chunks_size", layout.CHUNK_SIZE)
+    if isinstance(size, bool) or not isinstance(size, int) or size < 1:
+        raise PoolError(f"The file '{path}' is damaged: chunks_size is {size}.")
 
 
 def _is_feature(spec: Any) -> bool:
     if not isinstance(spec, dict) or not isinstance(spec.get("dtype"), str):
         return False
     shape = spec.get("shape")
-    return isinstance(shape, list) and bool(shape) and all(isinstance(n, int) for n in shape)
+    return isinstance(shape, list) and all(isinstance(n, int) for n in shape)
 
 
 def _read_manifest(root: Path) -> Mapping[str, Any]:
     path = root / layout.MANIFEST
     if not path.exists():
         return {}
-    manifest = _read_json(path)
+    manifest = read_json(path)
     entries = manifest.get("episodes", [])
     names = manifest.get("subtasks", [])
     sums = manifest.get("sha256", {})
@@ -146,76 +227,3 @@ def _read_manifest(root: Path) -> Mapping[str, Any]:
     if not lists or not all(isinstance(entry, dict) for entry in entries):
         raise PoolError(f"The file '{path}' is damaged: it does not have the form of a manifest.")
     return manifest
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise PoolError(f"The file '{path}' is damaged: it is no readable JSON.") from error
-    if not isinstance(value, dict):
-        raise PoolError(f"The file '{path}' is damaged: it is not a JSON object.")
-    return value
-
-
-def _read_subtasks(path: Path) -> tuple[str, ...]:
-    """Names of subtasks.parquet in the order of their index; () when the file is absent."""
-    if not path.exists():
-        return ()
-    numbered = []
-    for row in read_table(path).to_pylist():
-        number = row.pop(layout.SUBTASK_INDEX, None)
-        name = next((value for value in row.values() if isinstance(value, str)), None)
-        if not isinstance(number, int) or name is None:
-            raise PoolError(f"The file '{path}' is damaged: it has no names with their numbers.")
-        if number >= 0:
-            numbered.append((number, name))
-    return tuple(name for _, name in sorted(numbered))
-
-
-def _subtask_names(root: Path, manifest: Mapping[str, Any], rows: Sequence[Row]) -> tuple[str, ...]:
-    """From the manifest, else from subtasks.parquet, else from the spans beside the episodes."""
-    logged = tuple(map(str, manifest.get("subtasks", ())))
-    spans = (name for row in rows for name in row.get("sparse_subtask_names") or ())
-    return logged or _read_subtasks(root / layout.SUBTASKS) or tuple(dict.fromkeys(spans))
-
-
-def _episode_rows(root: Path, info: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The episodes table without its statistics, in order of the episode index."""
-    files = sorted((root / layout.EPISODES_FOLDER).rglob("*.parquet"))
-    rows = [
-        row
-        for file in files
-        for row in read_table(file, wanted=lambda name: not name.startswith("stats/")).to_pylist()
-    ]
-    if not rows:
-        raise PoolError(f"The pool '{root}' is empty: it has no demonstration.")
-    keys = [key for key, spec in info["features"].items() if spec["dtype"] == "video"]
-    for row in rows:
-        _check_row(root, row, keys)
-    return sorted(rows, key=lambda row: int(row["episode_index"]))
-
-
-def _check_row(root: Path, row: Row, video_keys: Sequence[str]) -> None:
-    whole = [*EPISODE_COLUMNS]
-    for key in video_keys:
-        whole += [f"videos/{key}/chunk_index", f"videos/{key}/file_index"]
-        stamp = row.get(f"videos/{key}/from_timestamp")
-        if not isinstance(stamp, int | float) or not 0 <= stamp < 1e9:
-            raise PoolError(
-                f"The episodes table of '{root}' is damaged: 'videos/{key}/from_timestamp' is "
-                f"{stamp}."
-            )
-    for name in whole:
-        value = row.get(name)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise PoolError(f"The episodes table of '{root}' is damaged: '{name}' is {value}.")
-    if row["length"] < 1:
-        raise PoolError(f"The demonstration {row['episode_index']} of '{root}' has no frame.")
-
-
-def _filled(template: str, **values: Any) -> str:
-    try:
-        return template.format(**values)
-    except (KeyError, IndexError, ValueError, TypeError, AttributeError) as error:
-        raise PoolError(f"The path '{template}' of info.json is not readable.") from error

@@ -130,18 +130,16 @@ class EpisodeWriter:
         self._check_record(record)
         for video in self._videos.values():
             video.close()
-        paths = {camera: self._folder / f"{camera}.mp4" for camera in self._header.cameras}
         fps = float(self._header.fps)
-        videos = {
-            camera: VideoClip(path, 0.0, self._length, fps).digest()
-            for camera, path in paths.items()
-        }
+        first = min(self._header.cameras)
+        clip = VideoClip(self._folder / f"{first}.mp4", 0.0, self._length, fps)
+        pictures = {layout.CAMERA_PREFIX + first: clip.digest()}
         logs = {name: np.stack(self._columns[name]) for name in _vector_columns(self._header)}
         staged = StagedEpisode(
             folder=self._folder,
             columns=self._table(),
             record=record,
-            demo_id=demo_id(videos, logs),
+            demo_id=demo_id(pictures, logs),
             histograms=self._histograms,
         )
         save_staged(staged, staged_folder(self._root, self._index))

@@ -1,8 +1,9 @@
-"""LeRobotDataset v3.0 folders, the native form of a pool."""
+"""LeRobotDataset folders, v3.0, v2.1 and v2.0; the first is the native form of a pool."""
 
 from pathlib import Path
 
 from teasim.common.errors import ConfigError
+from teasim.pool.integrity import check_pool
 from teasim.pool.lerobot import Pool, layout
 from teasim.pool.readers.reader import Reader, ReadOptions
 
@@ -24,4 +25,4 @@ def open_pool(path: Path, options: ReadOptions) -> Pool:
     return Pool.open(path)
 
 
-READER = Reader("LeRobot data set", recognises, open_pool)
+READER = Reader("LeRobot data set", recognises, open_pool, check_pool)
