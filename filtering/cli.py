@@ -13,6 +13,7 @@ from filtering.segmentation.config import FitConfig
 from teasim.common import parallel
 from teasim.common.cli import parse
 from teasim.common.errors import ConfigError
+from teasim.pool.readers.reader import ReadOptions
 
 if TYPE_CHECKING:
     from filtering.demo_filter import DemoFilter
@@ -35,14 +36,15 @@ class FilterCommand:
     """Give every demonstration of a pool a weight and flag the incorrect ones."""
 
     source: Annotated[Path, tyro.conf.Positional]
-    """The pool: a LeRobot v3.0 data set, or an MS-TCN folder (one label per frame in
-    groundTruth/*.txt or predictions/*.txt, and mapping.txt) without videos."""
+    """The demonstrations: a LeRobot data set (or its name on the Hugging Face Hub, if a copy is in
+    the local cache), a robomimic file, a Minari data set, a folder of ALOHA episodes or of videos,
+    or an MS-TCN folder (one label per frame, without videos)."""
     out: Out
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
     config: Annotated[FilterConfig, tyro.conf.OmitArgPrefixes]
     """Settings of the filter."""
-    fps: float | None = None
-    """Frames (lines) per second of an MS-TCN folder; without it, times are given in frames."""
+    options: Annotated[ReadOptions, tyro.conf.OmitArgPrefixes]
+    """What the format of the source does not store."""
     max_flagged: float = 1.0
     """Exit with code 1 if more than this share of the demonstrations is flagged, 0 to 1."""
     jobs: int | None = None
@@ -122,10 +124,9 @@ def segment(argv: Sequence[str] | None = None) -> int:
 def _filter(command: FilterCommand) -> int:
     from filtering.demo_filter import DemoFilter
     from filtering.output import check_output, write_filter_output
-    from teasim.pool.readers.reader import ReadOptions
     from teasim.pool.readers.registry import open_source
 
-    pool = open_source(command.source, ReadOptions(fps=command.fps))
+    pool = open_source(command.source, command.options)
     check_output(command.out, pool.root, overwrite=command.overwrite)
     fitted = DemoFilter(command.config).fit(pool, jobs=_jobs(command.jobs))
     write_filter_output(command.out, pool, fitted, overwrite=command.overwrite)

@@ -2,13 +2,20 @@
 
 from pathlib import Path
 
-from teasim.common.errors import PoolError
-from teasim.pool.hub import located, missing
-from teasim.pool.readers import lerobot, ms_tcn
+from teasim.common.errors import ConfigError, PoolError
+from teasim.pool import hub
+from teasim.pool.readers import aloha, lerobot, minari, ms_tcn, robomimic, videos
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.source import Source
 
-READERS: tuple[Reader, ...] = (lerobot.READER, ms_tcn.READER)
+READERS: tuple[Reader, ...] = (
+    lerobot.READER,
+    ms_tcn.READER,
+    minari.READER,
+    aloha.READER,
+    robomimic.READER,
+    videos.READER,
+)
 """Every format that can be read."""
 
 
@@ -17,15 +24,30 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
 
     Args:
         path: a folder or file, or the name of a data set in the local cache of the Hugging Face
-            Hub (`teasim.pool.hub`).
+            Hub (`teasim.pool.hub`) or of Minari.
         options: what the format does not store; None means nothing was said.
 
     Raises:
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it, or it is damaged.
     """
-    place = located(path)
-    return reader_of(place).open(place, options or ReadOptions())
+    place, options = located(path), options or ReadOptions()
+    reader = reader_of(place)
+    for name in options.given():
+        if name not in reader.options:
+            raise ConfigError(
+                f"The option {name} does not apply to '{place}' ({reader.name}); leave it out."
+            )
+    return reader.open(place, options)
+
+
+def located(path: Path | str) -> Path:
+    """Return the path itself, or where the local copy of the data set of that name is stored."""
+    copy = hub.located(path)
+    if copy.exists():
+        return copy
+    found = (reader.find(str(path)) for reader in READERS if reader.find is not None)
+    return next((place for place in found if place is not None), copy)
 
 
 def check_source(path: Path | str, options: ReadOptions | None = None) -> list[str]:
@@ -56,7 +78,7 @@ def reader_of(path: Path) -> Reader:
     """
     path = located(path)
     if not path.exists():
-        raise PoolError(missing(path))
+        raise PoolError(hub.missing(path))
     for reader in READERS:
         if reader.recognises(path):
             return reader
