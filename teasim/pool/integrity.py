@@ -8,8 +8,8 @@ import numpy as np
 
 from teasim.common.errors import PoolError
 from teasim.pool.clips import check_decodable, probe
+from teasim.pool.lerobot.describing.metadata import require_pool_folder
 from teasim.pool.lerobot.episode import Episode
-from teasim.pool.lerobot.metadata import require_pool_folder
 from teasim.pool.lerobot.reader import Pool
 from teasim.pool.lerobot.soundness import Problem, sentences
 from teasim.pool.source import Clip
