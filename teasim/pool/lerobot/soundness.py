@@ -16,10 +16,10 @@ from teasim.common.errors import PoolError
 from teasim.common.files import sha256_of
 from teasim.pool.clips import probe
 from teasim.pool.lerobot.columns import as_numpy, read_columns
+from teasim.pool.lerobot.describing.metadata import Metadata, metadata_notes
+from teasim.pool.lerobot.describing.places import inside
 from teasim.pool.lerobot.episode import NOT_NUMBERS, Episode
 from teasim.pool.lerobot.log import TIME_TOLERANCE
-from teasim.pool.lerobot.metadata import Metadata, metadata_notes
-from teasim.pool.lerobot.places import inside
 
 FRAME = 0.9
 """Lengths that differ by less than this share of a frame are equal; times are rounded."""
