@@ -101,7 +101,7 @@ def test_what_is_imported_is_what_is_declared():
     extras = PROJECT["optional-dependencies"]
     optional = {
         normal(Requirement(line).name)
-        for line in sum((extras[name] for name in ("dask", "ray", "hdf5")), [])
+        for line in [*extras["dask"], *extras["ray"], *extras["hdf5"]]
     }
     declared = {normal(Requirement(line).name) for line in PROJECT["dependencies"]}
     owners = packages_distributions()
