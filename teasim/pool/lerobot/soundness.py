@@ -161,7 +161,7 @@ def _check_video(meta: Metadata, episode: Episode, key: str) -> Iterator[str]:
     slack = FRAME / min(fps, video.fps)  # a camera may have a rate of its own
     if last - video.duration > slack:
         yield (
-            f"The video '{path}' is shorter than the log: it has {video.n_frames} frames but "
+            f"The video '{path}' is shorter than the log: it has {round(video.duration * fps)} frames but "
             f"demonstration {episode.index} ends at frame {round(last * fps)}."
         )
         return
@@ -185,7 +185,9 @@ def _too_long(meta: Metadata, episodes: Sequence[Episode]) -> Iterator[Problem]:
         for path, (episode, *others) in holders.items():
             with contextlib.suppress(PoolError):  # told where each video is checked
                 video, fps = probe(path), float(meta.fps)
-                log = float(episode.row.get(f"videos/{key}/from_timestamp", 0)) + episode.length / fps
+                log = (
+                    float(episode.row.get(f"videos/{key}/from_timestamp", 0)) + episode.length / fps
+                )
                 if not others and video.duration - log > FRAME / min(fps, video.fps):
                     yield Problem(
                         f"The log of demonstration {episode.index} is shorter than its video "
