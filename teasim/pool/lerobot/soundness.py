@@ -161,8 +161,8 @@ def _check_video(meta: Metadata, episode: Episode, key: str) -> Iterator[str]:
     slack = FRAME / min(fps, video.fps)  # a camera may have a rate of its own
     if last - video.duration > slack:
         yield (
-            f"The video '{path}' is shorter than the log: it has {round(video.duration * fps)} frames but "
-            f"demonstration {episode.index} ends at frame {round(last * fps)}."
+            f"The video '{path}' is shorter than the log: it has {round(video.duration * fps)} "
+            f"frames but demonstration {episode.index} ends at frame {round(last * fps)}."
         )
         return
     told = video.duration if end is None else float(end)
