@@ -123,8 +123,11 @@ def draw(kinds: np.ndarray, pools: int, seed: int) -> Iterator[Drawn]:
                 videos = [*good, *rng.permutation(those)[:BAD]]
             else:
                 videos = [*rng.permutation(those)[:CLEAN]]
-            yield Drawn(kind, videos, kinds[videos] == kind if kind in MISTAKES else
-                        np.zeros(len(videos), dtype=bool))
+            yield Drawn(
+                kind,
+                videos,
+                kinds[videos] == kind if kind in MISTAKES else np.zeros(len(videos), dtype=bool),
+            )
 
 
 def count(bank: Bank, drawn: Drawn, score: MomentScore) -> dict[str, float]:

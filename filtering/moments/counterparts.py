@@ -74,7 +74,10 @@ def compare(vectors: Sequence[Vectors], references: Sequence[int]) -> Counterpar
             if d in rows:
                 there[rows[d]][r], back[rows[d]][r] = back[row][d], there[row][d]
     return Counterparts(
-        tuple(map(len, vectors)), tuple(references), tuple(map(tuple, there)), tuple(map(tuple, back))
+        tuple(map(len, vectors)),
+        tuple(references),
+        tuple(map(tuple, there)),
+        tuple(map(tuple, back)),
     )
 
 

@@ -9,7 +9,7 @@ what usually changes here. A video has of it
 
 in a neighbourhood because no camera stands where another stood, and lacks
 
-    (median p - p_k) / sqrt(s^2 + FLOOR^2 + (SHARE median p)^2),       s from the MAD of p,
+    (q - p_k) / sqrt(s^2 + FLOOR^2 + (SHARE q)^2),       q the quantile VARIETY of p, s its MAD,
 
 which is about 1 / SHARE where nothing came of it and near 0 where it is as usual. Only changes that
 most videos show in the same cells count: what is carried from a place of its own to a common place
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts
-from filtering.moments.evidence import Evidence, Stretch
+from filtering.moments.evidence import VARIETY, Evidence, Stretch
 from filtering.moments.vectors import Video
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Usual:
     directions: Array
     """(C, 3) colour direction in which each changes, of length 1."""
     amounts: Array
-    """(C,) how much it changes in the median video."""
+    """(C,) how much it changes in most videos."""
     scatters: Array
     """(C,) how much the amount scatters."""
 
@@ -127,8 +127,8 @@ def usual_change(moment: int, changes: Array) -> Usual | None:
     rows, columns = np.unravel_index(flat, sizes.shape)
     directions = median[rows, columns] / sizes[rows, columns][:, None]
     seen = np.stack([_amounts(change, rows, columns, directions) for change in changes])
-    amounts = np.median(seen, axis=0)
-    mad = 1.4826 * np.median(np.abs(seen - amounts), axis=0)
+    amounts = np.quantile(seen, VARIETY, axis=0)
+    mad = 1.4826 * np.median(np.abs(seen - np.median(seen, axis=0)), axis=0)
     scatters = np.sqrt(mad**2 + FLOOR**2 + (SHARE * amounts) ** 2)
     return Usual(moment, rows, columns, directions, amounts, scatters)
 
@@ -186,9 +186,7 @@ def _place(found: Counterparts, row: int, d: int, moment: int) -> int:
 
 
 def _about(found: Counterparts, video: int, moment: int) -> Stretch:
-    return Stretch(
-        video, max(moment - REACH, 0), min(moment + REACH + 1, found.lengths[video])
-    )
+    return Stretch(video, max(moment - REACH, 0), min(moment + REACH + 1, found.lengths[video]))
 
 
 def _amounts(

@@ -1,14 +1,17 @@
 """What counterparts say against a demonstration: a stretch is missing, out of order or extra.
 
 With near_rd(t) the distance of the counterpart in video d of moment t of reference r, at_rd(t) its
-place, and u_r(t) the median of log near_rk(t) over the other references k:
+place, and Q_k the quantile 1 - VARIETY over the other references k:
 
-    missing    log near_rd(t) - u_r(t)                            the median over r
-    order      |at_rd(t) - median_k at_rk(t)| / (MAD_k + 0.02)    where near_rd(t) is not unusual
-    extra      log near_dr(t) - u_r(at_dr(t))                     of the moments t of d itself
+    missing    log near_rd(t) - Q_k log near_rk(t)
+    order      |at_rd(t) - m(t)| / (Q_k |at_rk(t) - m(t)| + 0.02)      m(t) = median_k at_rk(t)
+    extra      log near_dr(t) - median_k log near_rk(at_dr(t))         of moments t of d itself
 
-Each is summed up by the mean of its largest twelfth over t, because a step is a part of a video,
-and by its median over the references, because a reference may be incorrect too.
+Order counts only where the counterpart is no farther than is usual. What a share VARIETY of the
+videos does, an optional step left out or another legal order, is thus never evidence. Each curve is
+summed up by the mean of its largest twelfth over t, because a step is a part of a video; missing
+and order by the median over the references, because a reference may be incorrect too; extra by the
+quantile VARIETY.
 """
 
 from collections.abc import Sequence
@@ -21,6 +24,8 @@ from filtering.moments.counterparts import Counterparts
 
 Array = NDArray[np.float64]
 
+VARIETY = 0.3
+"""Share of the videos of a pool that makes a behaviour one of several usual ones."""
 WORST = 12
 """The worst 1 / WORST of a video counts."""
 FOUND = float(np.log(1.3))
@@ -81,7 +86,7 @@ def extra(found: Counterparts) -> Evidence:
                 if match is not None
             ]
         )
-        curve = np.median(curves, axis=0)
+        curve = np.quantile(curves, VARIETY, axis=0)
         start, stop = peak(curve)
         nearest = int(curves[:, start:stop].mean(axis=1).argmin())
         match = matches[nearest]
@@ -136,10 +141,10 @@ class _Reference:
         match = self._matches[d]
         assert match is not None
         kept = [row for row, k in enumerate(self._others) if k != d] or [0]
-        lack = np.log(match.near + TINY) - np.median(self._nears[kept], axis=0)
+        lack = np.log(match.near + TINY) - np.quantile(self._nears[kept], 1 - VARIETY, axis=0)
         places = self._places[kept]
         middle = np.median(places, axis=0)
-        scatter = np.median(np.abs(places - middle), axis=0) + PLACE_FLOOR
+        scatter = np.quantile(np.abs(places - middle), 1 - VARIETY, axis=0) + PLACE_FLOOR
         shift = np.abs(self._place(d, match.at) - middle) / scatter
         return lack, np.where(lack < FOUND, shift, 0.0)
 

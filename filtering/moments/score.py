@@ -26,7 +26,7 @@ from teasim.pool.source import Demonstration, Source
 
 RATE = 5.0
 """Moments looked at per second [Hz]."""
-NOTABLE = 2.0
+NOTABLE = 3.0
 """Exceedance from which a kind of evidence is a finding, unless there is no larger one."""
 
 Array = NDArray[np.float64]

@@ -48,9 +48,7 @@ def moment_vectors(videos: Sequence[Video]) -> list[Vectors]:
     """Return per video (n, K): looks and places side by side, of equal total variance."""
     looks = _main_directions([_scaled(video.looks) for video in videos])
     places = _main_directions([_places(video.cells) for video in videos])
-    return [
-        np.hstack(blocks).astype(np.float32) for blocks in zip(looks, places, strict=True)
-    ]
+    return [np.hstack(blocks).astype(np.float32) for blocks in zip(looks, places, strict=True)]
 
 
 def agreeing(vectors: Sequence[Vectors], differences: Iterable[Vectors]) -> list[Vectors]:

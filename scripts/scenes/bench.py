@@ -1,4 +1,4 @@
-"""A tool assembles small parts on a tray, filmed by a shaking camera, among things that lie about."""
+"""A tool assembles small parts on a tray, filmed by a shaking camera, among loose things."""
 
 import numpy as np
 
@@ -37,7 +37,11 @@ class Bench:
         self.start = dict(self.places)
         self.hand = HOME
         self.clutter = [
-            (np.array([rng.uniform(8, 40), rng.uniform(60, 110)]), rng.uniform(3, 7, 2), rng.integers(30, 230, 3))
+            (
+                np.array([rng.uniform(8, 40), rng.uniform(60, 110)]),
+                rng.uniform(3, 7, 2),
+                rng.integers(30, 230, 3),
+            )
             for _ in range(3)
         ]
         self.fly = rng.uniform(0, 100, 2)

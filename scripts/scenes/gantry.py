@@ -12,14 +12,18 @@ LIFT = 0.16
 """How high things are carried [m]."""
 FRAME = """
 <mujoco>
-  <visual><quality shadowsize="0" offsamples="0"/><headlight ambient=".4 .4 .4" diffuse=".4 .4 .4"/></visual>
-  <asset><texture name="t" type="2d" builtin="checker" rgb1=".55 .47 .38" rgb2=".5 .43 .35" width="64" height="64"/>
+  <visual><quality shadowsize="0" offsamples="0"/>
+    <headlight ambient=".4 .4 .4" diffuse=".4 .4 .4"/></visual>
+  <asset>
+    <texture name="t" type="2d" builtin="checker" rgb1=".55 .47 .38" rgb2=".5 .43 .35" width="64"
+      height="64"/>
     <material name="t" texture="t" texrepeat="5 5"/></asset>
   <worldbody>
     <light pos=".4 -.6 1.5" dir="-.3 .4 -1"/>
     <geom type="plane" size="1 1 .1" material="t"/>
     <camera name="front" pos="0 -.78 .72" xyaxes="1 0 0 0 .68 .73" fovy="38"/>
-    <body name="beam" mocap="true"><geom type="box" size=".5 .015 .015" rgba=".35 .35 .4 1" pos="0 0 .2"/></body>
+    <body name="beam" mocap="true">
+      <geom type="box" size=".5 .015 .015" rgba=".35 .35 .4 1" pos="0 0 .2"/></body>
     <body name="gripper" mocap="true">
       <geom type="box" size=".014 .014 .2" pos="0 0 .23" rgba=".3 .3 .34 1"/>
       <geom type="box" size=".035 .02 .012" pos="0 0 .03" rgba=".15 .15 .17 1"/>

@@ -66,12 +66,16 @@ class Panel:
         place = PARTS["dial"] + self.shift
         angle = -2.2 + 3.0 * self.state["dial"]
         canvas.disc(place, 12, (35, 35, 40))
-        canvas.line(place, place + 11 * np.array([np.sin(angle), -np.cos(angle)]), 3, (240, 240, 240))
+        canvas.line(
+            place, place + 11 * np.array([np.sin(angle), -np.cos(angle)]), 3, (240, 240, 240)
+        )
         place = PARTS["flap"] + self.shift
         canvas.box(place, (14, 11), (190, 120, 50))
         height = 11 * (1 - 0.85 * self.state["flap"])
         canvas.box(place + [0, -11 + height], (14, height), (120, 125, 135))
-        canvas.line(self.finger, self.finger + 0.9 * (AWAY - self.finger) + [0, 30], 12, self.sleeve)
+        canvas.line(
+            self.finger, self.finger + 0.9 * (AWAY - self.finger) + [0, 30], 12, self.sleeve
+        )
         canvas.line(self.finger, self.finger + [0, 14], 5, (200, 150, 120))
         return {"front": self.film.take(canvas.image)}
 

@@ -7,7 +7,12 @@ from scenes.scene import Scene
 
 BACKGROUND = table(120, 160, (175, 165, 150), 4)
 GLASS = np.array([80.0, 88.0])
-SYRUPS = {"red": (190, 30, 50), "yellow": (235, 190, 40), "blue": (50, 80, 190), "milk": (245, 245, 240)}
+SYRUPS = {
+    "red": (190, 30, 50),
+    "yellow": (235, 190, 40),
+    "blue": (50, 80, 190),
+    "milk": (245, 245, 240),
+}
 SHELF = {
     "red": np.array([16.0, 88.0]),
     "yellow": np.array([38.0, 88.0]),
@@ -84,7 +89,9 @@ class Pour:
         canvas.box(GLASS, (12, 17), (205, 212, 215))
         total = sum(self.amounts.values())
         if total:
-            mixed = sum(np.array(SYRUPS[name]) * part for name, part in self.amounts.items()) / total
+            mixed = (
+                sum(np.array(SYRUPS[name]) * part for name, part in self.amounts.items()) / total
+            )
             colour = tuple(int(value) for value in mixed)
             canvas.box(GLASS + [0, 16 - total / 2], (11, total / 2), colour)
         if "ice" in self.things:

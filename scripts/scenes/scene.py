@@ -80,9 +80,7 @@ class Plan(NamedTuple):
 def make_plan(scene: Scene, kind: str, rng: np.random.Generator) -> Plan:
     """Draw a plan of a kind."""
     steps = [
-        step
-        for step in scene.steps
-        if step not in scene.optional or rng.random() < OPTIONAL_SHARE
+        step for step in scene.steps if step not in scene.optional or rng.random() < OPTIONAL_SHARE
     ]
     if kind == "free":
         steps = legal_order(scene, steps, rng)

@@ -19,7 +19,8 @@ THINGS = """
 <geom type="box" size=".08 .004 .03" pos=".2 .25 .03" rgba=".35 .35 .4 1"/>
 <geom type="box" size=".08 .004 .03" pos=".2 .11 .03" rgba=".35 .35 .4 1"/>
 """ + "".join(
-    f'<body name="{name}" mocap="true"><geom type="box" size=".028 .028 .022" rgba="{colour}"/></body>'
+    f'<body name="{name}" mocap="true">'
+    f'<geom type="box" size=".028 .028 .022" rgba="{colour}"/></body>'
     for name, colour in COLOURS.items()
 )
 BASE = np.array([-0.15, 0.16, 0.034])

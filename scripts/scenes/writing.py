@@ -69,9 +69,7 @@ def write_video(task: tuple[Path, PoolHeader, int, str]) -> None:
         world.close()
 
 
-def play(
-    scene: Scene, plan: Plan, world: World, rng: np.random.Generator
-) -> Iterator[str | None]:
+def play(scene: Scene, plan: Plan, world: World, rng: np.random.Generator) -> Iterator[str | None]:
     """Carry out a plan frame by frame; yield the step of each frame, None at rest."""
     pace = np.exp(rng.normal(0, PACE))
     for act in plan.acts:
