@@ -22,6 +22,7 @@ from filtering.moments.vectors import Video
 from filtering.vision.frame_features import sampled_frames
 from teasim.common.statistics import auroc
 from teasim.pool import Pool
+from teasim.pool.lerobot import Episode
 
 GOOD, BAD, CLEAN = 10, 3, 12
 """Usual and incorrect videos of a pool with mistakes, and videos of a pool without."""
@@ -38,7 +39,9 @@ class Bank:
     name: str
     """Of the scene."""
     pool: Pool
-    """All of them."""
+    """The pool they are from."""
+    episodes: list[Episode]
+    """The videos."""
     seen: dict[str, list[Video]]
     """What each camera saw."""
     kinds: np.ndarray
@@ -62,6 +65,7 @@ def main() -> int:
     parser.add_argument("--tea", type=Path, nargs="*", default=[], help="pools of tea-making")
     parser.add_argument("--cameras", nargs="+", help="cameras of tea-making; default: all")
     parser.add_argument("--pools", type=int, default=4, help="pools per scene and kind")
+    parser.add_argument("--share", type=float, default=1.0, help="share of the videos drawn from")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
     arguments = parser.parse_args()
@@ -69,21 +73,27 @@ def main() -> int:
     print(f"{'scene':10}{'kind':14}{'AUROC':>7}{'found':>8}{'accused':>9}{'silent':>8}{'place':>7}")
     for name in arguments.scenes if arguments.scenes is not None else chosen:
         pool = make_bank(arguments.folder / name, SCENES[name], seed=0, jobs=arguments.jobs)
-        judge(bank_of(name, pool, pool.cameras, arguments.jobs), arguments)
+        judge(bank_of(name, pool, pool.cameras, arguments), arguments)
     for root in arguments.tea:
         pool = Pool.open(root)
-        judge(bank_of("tea", pool, arguments.cameras or pool.cameras, arguments.jobs), arguments)
+        judge(bank_of("tea", pool, arguments.cameras or pool.cameras, arguments), arguments)
     return 0
 
 
-def bank_of(name: str, pool: Pool, cameras: Sequence[str], jobs: int) -> Bank:
-    """Look at all videos of a pool."""
-    return Bank(
-        name,
-        pool,
-        look(pool, pool.episodes, cameras, jobs=jobs),
-        np.array([kind_of(episode.record) for episode in pool.episodes]),
+def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.Namespace) -> Bank:
+    """Look at the first videos of each kind of a pool."""
+    kinds = np.array([kind_of(episode.record) for episode in pool.episodes])
+    chosen = np.sort(
+        np.concatenate(
+            [
+                those[: round(arguments.share * len(those))]
+                for those in (np.flatnonzero(kinds == kind) for kind in np.unique(kinds))
+            ]
+        )
     )
+    episodes = [pool.episodes[number] for number in chosen]
+    seen = look(pool, episodes, cameras, jobs=arguments.jobs)
+    return Bank(name, pool, episodes, seen, kinds[chosen])
 
 
 def kind_of(record) -> str:
@@ -145,7 +155,7 @@ def count(bank: Bank, drawn: Drawn, score: MomentScore) -> dict[str, float]:
 
 def _place_is_right(bank: Bank, drawn: Drawn, score: MomentScore, d: int) -> bool:
     """Tell whether the first finding of a demonstration lies at one of its mistakes."""
-    episode, first = bank.pool.episodes[drawn.videos[d]], score.findings[d][0]
+    episode, first = bank.episodes[drawn.videos[d]], score.findings[d][0]
     frames = sampled_frames(episode.length, len(bank.seen[first.camera][drawn.videos[d]]))
     start, stop = frames[first.own.start], frames[first.own.stop - 1]
     slack = NEAR * bank.pool.fps

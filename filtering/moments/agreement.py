@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 
 LAG = 4
 """Moments on each side between which a jump is looked for."""
-JUMP = 3 * LAG
-"""How far counterparts LAG moments apart on each side may lie apart for them to be neighbours."""
+JUMP = 2 * LAG
+"""How much farther than in the reference counterparts of neighbours may lie apart [moments]."""
 LEAST_JUMPS = 0.15
 """Share of the videos that jump from which there is a border."""
 LEAST_SEEN = 0.5
@@ -87,7 +87,7 @@ def jumps_of(match: Match) -> NDArray[np.bool_]:
     moments = np.arange(len(at))
     before = at[np.maximum(moments - LAG, 0)]
     after = at[np.minimum(moments + LAG, len(at) - 1)]
-    return np.asarray((after < before) | (after - before > 2 * JUMP))
+    return np.asarray((after < before) | (after - before > 2 * LAG + JUMP))
 
 
 def _borders(jumps: Array) -> list[int]:

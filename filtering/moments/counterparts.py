@@ -109,7 +109,9 @@ def _nearest(distances: NDArray[np.float32]) -> Match:
 def _differences(vectors: Sequence[Vectors], found: Counterparts) -> Iterator[Vectors]:
     """Yield (P, K) per pair: what the nearer half of the mutual counterparts differ by."""
     for r in range(len(vectors)):
-        for d in range(r):
+        for d in range(len(vectors)):
+            if r == d:
+                continue
             there, back = found.there[r][d], found.back[r][d]
             assert there is not None
             assert back is not None
