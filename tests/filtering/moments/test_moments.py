@@ -79,9 +79,12 @@ def test_a_pool_without_mistakes_is_not_accused():
     assert not judged(usual_videos(9)).flagged.any()
 
 
-def test_a_tenth_more_or_less_of_tempo_is_no_mistake():
-    videos = [toy_video(range(STEPS), n, tempo=tempo) for n, tempo in enumerate((0.9, 1, 1.1) * 3)]
-    assert not judged(videos).flagged.any()
+def test_a_missing_step_stands_out_among_other_tempi():
+    tempi = (0.9, 1.0, 1.1) * 3
+    videos = [toy_video(range(STEPS), seed, tempo=tempo) for seed, tempo in enumerate(tempi)]
+    score = judged([*videos, toy_video(MISSING, 50)])
+    assert score.losses.argmax() == len(videos)
+    assert score.flagged[-1]
 
 
 def test_the_same_videos_give_the_same_bits(with_a_step_missing):
