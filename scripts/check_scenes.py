@@ -109,7 +109,7 @@ def judge(bank: Bank, arguments: argparse.Namespace) -> None:
         part = {c: [seen[v] for v in drawn.videos] for c, seen in bank.seen.items()}
         rows.setdefault(drawn.kind, []).append(count(bank, drawn, score_moments(part)))
     for kind, counted in rows.items():
-        mean = {key: np.nanmean([row[key] for row in counted]) for key in counted[0]}
+        mean = {key: _mean([row[key] for row in counted]) for key in counted[0]}
         if kind in ("usual", "free"):
             line = f"{'':15}{mean['accused']:>9.2f}{mean['silent']:>8.2f}"
         else:
@@ -151,6 +151,12 @@ def count(bank: Bank, drawn: Drawn, score: MomentScore) -> dict[str, float]:
         "silent": float(not flagged[~bad].any()),
         "place": float(np.mean(right)) if right else np.nan,
     }
+
+
+def _mean(values: Sequence[float]) -> float:
+    """Return the mean of what is known, NaN where nothing is."""
+    known = [value for value in values if not np.isnan(value)]
+    return float(np.mean(known)) if known else np.nan
 
 
 def _place_is_right(bank: Bank, drawn: Drawn, score: MomentScore, d: int) -> bool:
