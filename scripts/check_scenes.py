@@ -52,8 +52,11 @@ class Drawn(NamedTuple):
     """A pool that was drawn."""
 
     kind: str
+    """Kind of its mistakes, or usual or free."""
     videos: list[int]
+    """Numbers in the bank."""
     bad: np.ndarray
+    """(D,) True for incorrect ones."""
 
 
 def main() -> int:

@@ -9,7 +9,7 @@ what usually changes here. A video has of it
 
 in a neighbourhood because no camera stands where another stood, and lacks
 
-    (q - p_k) / sqrt(s^2 + FLOOR^2 + (SHARE q)^2),       q the quantile VARIETY of p, s its MAD,
+    (q - p_k) / sqrt(s^2 + NOISE^2 + (SHARE q)^2),       q the quantile VARIETY of p, s its MAD,
 
 which is about 1 / SHARE where nothing came of it and near 0 where it is as usual. Only changes that
 most videos show in the same cells count: what is carried from a place of its own to a common place
@@ -45,7 +45,7 @@ NEIGHBOURHOOD = 2
 """How far a thing may lie from where it usually does [cells]."""
 LEAST_CHANGE = 12.0
 """Least usual change of a cell that counts, 0..255."""
-FLOOR = 5.0
+NOISE = 5.0
 """Scatter of a change that is always allowed for, 0..255."""
 SHARE = 0.15
 """The same in proportion to the change."""
@@ -87,7 +87,9 @@ class _View(NamedTuple):
     """What is usual from the viewpoint of one reference."""
 
     row: int
+    """Row of the reference."""
     usual: list[Usual]
+    """What usually changes, in order of time."""
 
 
 def ineffective(found: Counterparts, videos: Sequence[Video]) -> Evidence:
@@ -129,7 +131,7 @@ def usual_change(moment: int, changes: Array) -> Usual | None:
     seen = np.stack([_amounts(change, rows, columns, directions) for change in changes])
     amounts = np.quantile(seen, VARIETY, axis=0)
     mad = 1.4826 * np.median(np.abs(seen - np.median(seen, axis=0)), axis=0)
-    scatters = np.sqrt(mad**2 + FLOOR**2 + (SHARE * amounts) ** 2)
+    scatters = np.sqrt(mad**2 + NOISE**2 + (SHARE * amounts) ** 2)
     return Usual(moment, rows, columns, directions, amounts, scatters)
 
 

@@ -30,7 +30,7 @@ WORST = 12
 """The worst 1 / WORST of a video counts."""
 FOUND = float(np.log(1.3))
 """Largest log of how much farther than usual a counterpart may be to count as found."""
-PLACE_FLOOR = 0.02
+PLACE_NOISE = 0.02
 """Scatter of places that is always allowed for [length of the video]."""
 TINY = 1e-6
 """Keeps logarithms finite where two videos are the same."""
@@ -144,7 +144,7 @@ class _Reference:
         lack = np.log(match.near + TINY) - np.quantile(self._nears[kept], 1 - VARIETY, axis=0)
         places = self._places[kept]
         middle = np.median(places, axis=0)
-        scatter = np.quantile(np.abs(places - middle), 1 - VARIETY, axis=0) + PLACE_FLOOR
+        scatter = np.quantile(np.abs(places - middle), 1 - VARIETY, axis=0) + PLACE_NOISE
         shift = np.abs(self._place(d, match.at) - middle) / scatter
         return lack, np.where(lack < FOUND, shift, 0.0)
 

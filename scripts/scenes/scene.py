@@ -36,7 +36,9 @@ class Act(NamedTuple):
     """One step of a plan."""
 
     step: str
+    """Name of the step."""
     works: bool
+    """Whether it has its effect."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class Plan(NamedTuple):
     """What is to be done in one video, and what is wrong with it."""
 
     acts: tuple[Act, ...]
+    """What is done, in order of time."""
     wrong: int | None
     """Place of the act that is wrong, or before which one is missing; None for a correct plan."""
     kind: str
