@@ -10,10 +10,10 @@ import numpy as np
 
 from teasim.common.errors import RenderError
 from teasim.gl import choose_gl
-from teasim.world.borrowing import Borrowed
-from teasim.world.dressing import apply_look
 from teasim.world.liquids import VESSELS, Stream
-from teasim.world.looks import Look
+from teasim.world.looks.borrowing import Borrowed
+from teasim.world.looks.dressing import apply_look
+from teasim.world.looks.look import Look
 from teasim.world.pictures import check_picture
 from teasim.world.segments import SEGMENT_NAMES, segments
 from teasim.world.simulation import Simulation

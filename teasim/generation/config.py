@@ -144,8 +144,8 @@ class GenerateConfig:
 
     def _check_participants(self) -> None:
         from teasim.skills.demonstrators import PARTICIPANTS
-        from teasim.world.embodiments import find_embodiment
-        from teasim.world.looks import check_look_kind
+        from teasim.world.bodies.embodiments import find_embodiment
+        from teasim.world.looks.look import check_look_kind
 
         find_embodiment(self.embodiment)
         check_look_kind(self.look)

@@ -19,8 +19,8 @@ from teasim.task.mistakes import PlannedMistake
 from teasim.task.recipes import oven_is_on
 from teasim.task.scoring import Verdict, judge, spills
 from teasim.task.subtasks import find_subtask
-from teasim.world.embodiments import find_embodiment
-from teasim.world.looks import draw_look
+from teasim.world.bodies.embodiments import find_embodiment
+from teasim.world.looks.look import draw_look
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 
 ATTEMPTS = 6

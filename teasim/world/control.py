@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARMS, CONTROL_TIMESTEP, UPDATES_PER_CONTROL
-from teasim.world.embodiments import YUMI, Embodiment
+from teasim.world.bodies.embodiments import YUMI, Embodiment
 from teasim.world.state import Saved
 
 BLOCKED_LAG = 0.004

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARMS
-from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.bodies.embodiments import EMBODIMENTS
 from teasim.world.simulation import Simulation
 
 TCP_SPEED_LIMIT = 1.5

@@ -11,11 +11,11 @@ from teasim.constants import (
     STEPS_PER_UPDATE,
     UPDATES_PER_CONTROL,
 )
+from teasim.world.bodies.embodiments import find_embodiment
+from teasim.world.bodies.person import Appearance, wear
 from teasim.world.control import Controller
-from teasim.world.embodiments import find_embodiment
 from teasim.world.events import Event, Recogniser
 from teasim.world.liquids import CONTENTS, VESSELS, Liquids, Stream
-from teasim.world.person import Appearance, wear
 from teasim.world.state import PhysicsState, SimulationState
 from teasim.world.station import FREE_BODIES, Layout, body_name, place, station_model
 

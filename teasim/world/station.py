@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import PHYSICS_TIMESTEP, assets_folder
-from teasim.world.embodiments import find_embodiment
+from teasim.world.bodies.embodiments import find_embodiment
 from teasim.world.grain import add_grain
 
 

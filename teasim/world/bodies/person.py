@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARMS, assets_folder
-from teasim.world.yumi import set_contacts
+from teasim.world.bodies.yumi import set_contacts
 
 HAND_JOINTS = {
     arm: tuple(f"{arm}_{name}" for name in ("x", "y", "z", "roll", "pitch", "yaw")) for arm in ARMS
