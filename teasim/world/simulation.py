@@ -86,13 +86,17 @@ class Simulation:
         """Give the person at the station the colours of `appearance`."""
         wear(self.model, appearance)
 
-    def step(self, target: np.ndarray) -> None:
-        """Advance one control step towards `target`: joint angles [rad], openings [m].
+    def step(self, target: np.ndarray, offset: np.ndarray | None = None) -> None:
+        """Advance one control step towards `target`.
 
-        The shape of `target` is (16,) for YuMi, (2 n + 2,) for a body with n joints per arm.
+        Args:
+            target: Joint angles [rad] and openings [m] (2 n + 2,), n joints per arm; YuMi has 7.
+            offset: Disturbance of the same shape that is added to what the motors follow, and not
+                to `self.target`, from which the skills plan.
         """
         self.target = np.array(target, dtype=float)
-        segment = self._controller.commands(self.target, self.data)
+        followed = self.target if offset is None else self.target + offset
+        segment = self._controller.commands(followed, self.data)
         for update in range(UPDATES_PER_CONTROL):
             segment.apply(update, self.data)
             mujoco.mj_step(self.model, self.data, nstep=STEPS_PER_UPDATE)

@@ -13,6 +13,7 @@ PIXEL_STRIDE = 2
 """Every second row and column enters the image statistics."""
 
 N_LEVELS = 256
+"""Levels of a uint8 colour channel."""
 
 Stats = dict[str, list[Any]]
 
