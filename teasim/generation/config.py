@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 SIZES = (32, 1024)
 """Smallest and largest side of a video [pixels]."""
-MOST_NOISE = 0.02
-"""Largest execution noise [rad]: with more, grasps fail too often for a pool."""
+MOST_NOISE = 0.01
+"""Largest execution noise [rad]: it makes two of three attempts fail, twice as much makes all fail."""
 MISTAKE_FORMAT = "NAME[@SUBTASK][+NAME...][:COUNT]"
 """How a mistake and a count are written on the command line."""
 
@@ -97,7 +97,8 @@ class PoolOptions:
     differ in every video."""
     execution_noise: float = 0.0
     """Standard deviation of a slow random disturbance of the executed joint targets [rad], at most
-    0.02. The logged actions stay the planned targets, so the pool shows recoveries."""
+    0.01; 0.005 is a good start. The logged actions stay the planned targets, so the pool shows
+    recoveries."""
     seed: int = 0
     """Seed of everything random; the same seed gives the same files."""
 
