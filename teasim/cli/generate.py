@@ -8,8 +8,14 @@ from typing import Annotated
 
 import tyro
 
+from teasim.common.cli import parse
 from teasim.common.parallel import default_jobs
 from teasim.generation.config import GenerateConfig, PoolOptions
+
+EXAMPLES = (
+    "teasim generate pool --seq1 10 --mistakes skip:2 ineffective@add_milk",
+    "teasim generate states --seq1 50 --no-video --execution-noise 0.005",
+)
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,7 @@ class GenerateArguments:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Render a pool of tea-making demonstrations, with mistakes in it when asked for."""
-    arguments = tyro.cli(GenerateArguments, prog="teasim generate", args=argv)
+    arguments = parse(GenerateArguments, argv, verb="generate", examples=EXAMPLES)
     pools = _pools(arguments)
     from teasim.generation.making import generate
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 SIZES = (32, 1024)
 """Smallest and largest side of a video [pixels]."""
 MOST_NOISE = 0.01
-"""Largest execution noise [rad]: it makes two of three attempts fail, twice as much makes all fail."""
+"""Largest execution noise [rad], with which about two of three attempts fail; with 0.02 all do."""
 MISTAKE_FORMAT = "NAME[@SUBTASK][+NAME...][:COUNT]"
 """How a mistake and a count are written on the command line."""
 
