@@ -34,7 +34,8 @@ def generate(
         RenderError: no headless OpenGL back end works.
     """
     check_workers(jobs, backend)
-    choose_gl()  # fails before anything is written if nothing can be rendered
+    if config.video:
+        choose_gl()  # fails before anything is written if nothing can be rendered
     plans = plan_pool(config)
     header = pool_header(config)
     claim_folder(Path(root), header)

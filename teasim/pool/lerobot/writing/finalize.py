@@ -30,8 +30,9 @@ from teasim.pool.lerobot.writing.statistics import (
 from teasim.pool.types import NO_SUBTASK, PoolHeader
 
 MANIFEST_FORMAT = "teasim-pool"
+"""Tells our manifests from other files."""
 MANIFEST_VERSION = 1
-"""Version of the form of the manifest."""
+"""Increased when a reader of the old manifest could not read the new one."""
 MISTAKES_TYPE = pa.list_(
     pa.struct(
         [
@@ -69,7 +70,8 @@ def finalize_pool(root: Path | str, header: PoolHeader, n_episodes: int) -> Pool
     _Assembly(assembled, header, staged).write()
     for folder in ("data", "videos", "teasim", "meta"):
         shutil.rmtree(root / folder, ignore_errors=True)
-        (assembled / folder).rename(root / folder)
+        if (assembled / folder).exists():  # without a camera there is no folder of videos
+            (assembled / folder).rename(root / folder)
     sync(root)
     shutil.rmtree(root / layout.STAGING)
     return Pool.open(root)
@@ -228,7 +230,7 @@ class _Assembly:
             "fps": self.header.fps,
             "splits": {"train": f"0:{len(self.episodes)}"},
             "data_path": layout.DATA_PATH,
-            "video_path": layout.VIDEO_PATH,
+            "video_path": layout.VIDEO_PATH if self.header.cameras else None,
             "features": self.features,
         }
 
