@@ -20,8 +20,9 @@ class FilterArguments:
     """Give every demonstration of a pool a weight and flag the incorrect ones."""
 
     source: Annotated[Path, tyro.conf.Positional]
-    """The pool: a LeRobot v3.0 data set with labelled sub-tasks, or an MS-TCN folder (labels per
-    frame in groundTruth/*.txt or predictions/*.txt, mapping.txt) without videos."""
+    """The demonstrations: a LeRobot v3.0 data set, a robomimic file, a Minari data set, a folder of
+    ALOHA episodes or of videos, or an MS-TCN folder (labels per frame in groundTruth/*.txt or
+    predictions/*.txt, mapping.txt) without videos."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
     segmenter: str = "logged"
@@ -60,7 +61,13 @@ class FilterArguments:
     """What describes a segment for equation3: pooled (nothing is learned), or the folder of a
     segmenter that `teasim segment fit --features` made."""
     fps: float | None = None
-    """Frames (lines) per second of an MS-TCN folder; times are told in frames if not given."""
+    """Frames per second of a source that does not store it; times of an MS-TCN folder are in frames
+    if not given."""
+    mask: str | None = None
+    """Read only the demonstrations of this mask of a robomimic file, e.g. train."""
+    background_label: tuple[str, ...] = ()
+    """Further labels of frames that belong to no sub-task of an MS-TCN folder, beside background,
+    SIL, action_start and action_end (--background is about background subtraction)."""
     max_flagged: float = 1.0
     """Exit with 1 when more than this share of the demonstrations is flagged, 0 to 1."""
     jobs: int = 0
@@ -183,7 +190,8 @@ def run(arguments: FilterArguments) -> int:
         features=arguments.features,
         effects=arguments.effects,
     )
-    pool = open_source(arguments.source, ReadOptions(fps=arguments.fps))
+    options = ReadOptions(arguments.fps, arguments.mask, arguments.background_label)
+    pool = open_source(arguments.source, options)
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)
     jobs = arguments.jobs or parallel.default_jobs()
     fitted = DemoFilter(config).fit(pool, jobs=jobs)

@@ -196,7 +196,7 @@ def _predict_folder(segmenter: MSTCNSegmenter, folder: MSTCNFolder, out: Path) -
         posteriors[video] = probabilities[:, : len(segmenter.subtasks)]
         known = folder.truth(video)
         if known is not None:
-            truth[video] = to_common[known]
+            truth[video] = to_common[known[: len(labels)]]
             pairs.append(LabelPair(truth[video], predicted[video]))
     write_predictions(out, names, predicted, truth, posteriors)
     return {UNSEEN: segmentation_scores(pairs)} if pairs else {}

@@ -1,10 +1,10 @@
 """The folder form of action segmentation data sets (50-Salads, GTEA, Breakfast) as MS-TCN reads it.
 
 mapping.txt              lines "number name"
-groundTruth/VIDEO.txt    one label per frame and line
-features/VIDEO.npy       optional, (D, n) float
+groundTruth/VIDEO.txt    one label per frame
+features/VIDEO.npy       optional, (D, n) float; also (n, D), and either with an axis of length 1
 splits/NAME.bundle       optional, one file name of groundTruth per line
-predictions/VIDEO.txt    optional, like groundTruth
+predictions/VIDEO.txt    optional, like groundTruth; also results/VIDEO and results/split_1/VIDEO
 posteriors/VIDEO.npy     optional, (T, n) probability of each label, beside predictions
 
 Of groundTruth, features and predictions one is enough.
@@ -19,15 +19,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teasim.common.errors import PoolError
-from teasim.common.files import write_atomically, write_text
+from teasim.common.files import write_text
+from teasim.pool.mstcn_arrays import Layout, feature_shape, layout_of, read_array, write_array
+from teasim.pool.mstcn_labels import (
+    BACKGROUND,
+    COMMENT,
+    LABEL_SUFFIXES,
+    read_labels,
+    read_lines,
+    read_mapping,
+    video_name,
+)
 from teasim.pool.types import NO_SUBTASK
 
-BACKGROUND = "background"
-"""Label of frames that belong to no segment; the published measures leave it out."""
 MAPPING = "mapping.txt"
 TRUTH = "groundTruth"
 FEATURES = "features"
 PREDICTIONS = "predictions"
+RESULTS = "results"
 POSTERIORS = "posteriors"
 SPLITS = "splits"
 
@@ -39,30 +48,42 @@ class MSTCNFolder:
     root: Path
     """The folder."""
     names: tuple[str, ...]
-    """Names of the labels in the order of their numbers in mapping.txt."""
+    """Names of the labels in the order of their numbers in mapping.txt, without background."""
     videos: tuple[str, ...]
     """Names of the videos in alphabetical order, without suffix."""
+    truth_files: Mapping[str, Path]
+    """Files of true labels by video."""
+    prediction_files: Mapping[str, Path]
+    """Files of predicted labels by video."""
+    feature_files: Mapping[str, Path]
+    """Files of features by video."""
+    background: tuple[str, ...] = (BACKGROUND,)
+    """Labels of frames that belong to no sub-task."""
 
     @classmethod
-    def open(cls, path: Path | str) -> Self:
+    def open(cls, path: Path | str, background: tuple[str, ...] = (BACKGROUND,)) -> Self:
         """Read the mapping and list the videos.
 
+        Args:
+            path: the folder.
+            background: labels of frames that belong to no sub-task; by default the one that the
+                published measures leave out.
+
         Raises:
-            PoolError: the mapping is missing or damaged, or there is no video.
+            PoolError: the mapping is missing or damaged, there is no video, or one of them twice.
         """
         root = Path(path)
-        names = _read_mapping(root / MAPPING)
-        videos = sorted(
-            {file.stem for file in (root / TRUTH).glob("*.txt")}
-            | {file.stem for file in (root / FEATURES).glob("*.npy")}
-            | {file.stem for file in (root / PREDICTIONS).glob("*.txt")}
-        )
+        names = read_mapping(root / MAPPING, background)
+        truth = _by_video(_files(root / TRUTH, LABEL_SUFFIXES))
+        features = _by_video(_files(root / FEATURES, (".npy",)))
+        predictions = _by_video(_prediction_files(root, {*truth, *features}))
+        videos = sorted({*truth, *features, *predictions})
         if not videos:
             raise PoolError(
                 f"The folder '{root}' holds neither {TRUTH}/*.txt nor {FEATURES}/*.npy nor "
                 f"{PREDICTIONS}/*.txt; it needs one of them."
             )
-        return cls(root, names, tuple(videos))
+        return cls(root, names, tuple(videos), truth, predictions, features, background)
 
     def truth(self, video: str) -> NDArray[np.int64] | None:
         """Return the true label of each frame, (n,), NO_SUBTASK for background; None without.
@@ -70,8 +91,9 @@ class MSTCNFolder:
         Raises:
             PoolError: the file is empty, or names a label that the mapping lacks.
         """
-        path = self.root / TRUTH / f"{video}.txt"
-        return self._labels(path) if path.exists() else None
+        if video not in self.truth_files:
+            return None
+        return read_labels(self.truth_files[video], self.names, self.background)
 
     def predictions(self, video: str) -> NDArray[np.int64]:
         """Return the predicted label of each frame, (n,), NO_SUBTASK for background.
@@ -79,7 +101,8 @@ class MSTCNFolder:
         Raises:
             PoolError: the file is missing or empty, or names a label that the mapping lacks.
         """
-        return self._labels(self.root / PREDICTIONS / f"{video}.txt")
+        path = self.prediction_files.get(video, self.root / PREDICTIONS / f"{video}.txt")
+        return read_labels(path, self.names, self.background)
 
     def posteriors(self, video: str) -> NDArray[np.float32] | None:
         """Return the probability of each label in each frame, (n, T); None without.
@@ -90,7 +113,7 @@ class MSTCNFolder:
         path = self.root / POSTERIORS / f"{video}.npy"
         if not path.exists():
             return None
-        stored = _read_array(path)
+        stored = read_array(path)
         shape = (len(self.names), len(self.predictions(video)))
         if stored.shape[0] > shape[0] or stored.shape[1] != shape[1]:
             raise PoolError(
@@ -104,18 +127,19 @@ class MSTCNFolder:
     def features(self, video: str) -> NDArray[np.float32]:
         """Return the features of a video, (n, D).
 
+        Labels, where they are known, tell which axis is time. Either may be some frames longer: n
+        is the smaller number.
+
         Raises:
             PoolError: the file is missing or damaged, or its length is not that of the labels.
         """
-        path = self.root / FEATURES / f"{video}.npy"
-        stored = _read_array(path)
-        truth = self.truth(video)
-        if truth is not None and len(truth) != stored.shape[1]:
-            raise PoolError(
-                f"'{path}' has {stored.shape[1]} frames (shape {stored.shape}, features by frames) "
-                f"but {TRUTH}/{video}.txt has {len(truth)} labels."
-            )
-        return np.ascontiguousarray(stored.T, dtype=np.float32)
+        path = self.feature_files.get(video)
+        if path is None:
+            raise PoolError(f"The features '{self.root / FEATURES / video}.npy' are missing.")
+        stored = read_array(path)
+        layout = self._layout(video)
+        rows = stored.T if layout.frames_axis else stored
+        return np.ascontiguousarray(rows[: layout.frames], dtype=np.float32)
 
     def split(self, name: str) -> tuple[str, ...]:
         """Return the videos of splits/NAME.bundle, for instance train.split1.
@@ -129,30 +153,96 @@ class MSTCNFolder:
             raise PoolError(
                 f"The folder '{self.root}' has no split '{name}'; it has {known or 'none'}."
             )
-        videos = tuple(Path(line).stem for line in _read_lines(path) if line.strip())
+        lines = [line for line in read_lines(path) if line and not line.startswith(COMMENT)]
+        videos = tuple(video_name(line.rpartition("/")[2]) for line in lines)
         for video in videos:
             if video not in self.videos:
                 raise PoolError(f"'{path}' names the video '{video}', which is not in the folder.")
         return videos
 
-    def _labels(self, path: Path) -> NDArray[np.int64]:
-        lines = _read_lines(path)
-        if not lines:
-            raise PoolError(f"'{path}' is empty; it needs one label per frame and line.")
-        numbers = {name: number for number, name in enumerate(self.names)}
-        numbers[BACKGROUND] = NO_SUBTASK
-        for place, label in enumerate(lines, start=1):
-            if label not in numbers:
-                raise PoolError(
-                    f"Line {place} of '{path}' has the label '{label}', which {MAPPING} lacks; "
-                    f"it has {', '.join(self.names)}."
+    def notes(self) -> tuple[str, ...]:
+        """Return what features leave in doubt, or make unusable, one sentence each."""
+        told, uneven = [], []
+        for video, path in self.feature_files.items():
+            try:
+                layout, shape, labels = self._layout(video), feature_shape(path), self._count(video)
+            except PoolError as error:
+                told.append(str(error))
+                continue
+            if not layout.certain:
+                told.append(
+                    f"Both axes of '{path}', {shape[0]} x {shape[1]}, fit its {labels} labels; it "
+                    "is read as features by frames."
                 )
-        return np.array([numbers[label] for label in lines], dtype=np.int64)
+            if labels is not None and labels != shape[layout.frames_axis]:
+                uneven.append(video)
+        if uneven:
+            told.append(
+                f"Labels and features of {len(uneven)} videos of '{self.root}' differ by a few "
+                f"frames, and the longer is cut: {', '.join(uneven[:3])}"
+                f"{', ...' * (len(uneven) > 3)}."
+            )
+        return tuple(told)
+
+    def _count(self, video: str) -> int | None:
+        """Return the number of labels, the true ones if there are any; None without."""
+        path = self.truth_files.get(video, self.prediction_files.get(video))
+        return None if path is None else len(read_labels(path, self.names, self.background))
+
+    def _layout(self, video: str) -> Layout:
+        path, labels = self.feature_files[video], self._count(video)
+        shape = feature_shape(path)
+        layout = layout_of(shape, labels)
+        if layout is None:
+            known = TRUTH if video in self.truth_files else PREDICTIONS
+            raise PoolError(
+                f"'{path}' has {shape[1]} frames (shape {shape}, features by frames) "
+                f"but {known}/{video}.txt has {labels} labels."
+            )
+        return layout
 
 
 def is_mstcn_folder(path: Path) -> bool:
     """Tell whether `path` looks like such a folder, be it a damaged one."""
     return any((path / name).exists() for name in (MAPPING, TRUTH, PREDICTIONS))
+
+
+def _files(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    found = folder.iterdir() if folder.is_dir() else ()
+    return sorted(file for file in found if file.suffix in suffixes and file.name[0] != ".")
+
+
+def _prediction_files(root: Path, known: set[str]) -> list[Path]:
+    """Return the files of predicted labels; without suffix, or with any if the video is known."""
+    home = root / PREDICTIONS if (root / PREDICTIONS).is_dir() else root / RESULTS
+    found: list[Path] = []
+    for folder in (home, *sorted(home.glob("split_*"))):
+        inside = folder.iterdir() if folder.is_dir() else ()
+        found += [
+            file
+            for file in sorted(inside)
+            if file.is_file()
+            and file.name[0] != "."
+            and (file.suffix in ("", *LABEL_SUFFIXES) or file.name in known)
+        ]
+    return found
+
+
+def _by_video(files: Sequence[Path]) -> dict[str, Path]:
+    """Return files by the video that each is about.
+
+    Raises:
+        PoolError: two are about one video.
+    """
+    found: dict[str, Path] = {}
+    for file in files:
+        other = found.setdefault(video_name(file.name), file)
+        if other != file:
+            raise PoolError(
+                f"'{other}' and '{file}' are both about the video '{video_name(file.name)}'; "
+                "remove one of them."
+            )
+    return found
 
 
 def write_predictions(
@@ -179,64 +269,5 @@ def write_predictions(
             lines = [BACKGROUND if n == NO_SUBTASK else names[n] for n in numbers]
             write_text(out / folder / f"{video}.txt", "\n".join(lines) + "\n")
     for video, probabilities in posteriors.items():
-        _write_array(out / POSTERIORS / f"{video}.npy", probabilities.T)
+        write_array(out / POSTERIORS / f"{video}.npy", probabilities.T)
     write_text(out / MAPPING, "".join(f"{n} {name}\n" for n, name in enumerate(names)))
-
-
-def _write_array(path: Path, array: NDArray[np.float32]) -> None:
-    def fill(target: Path) -> None:
-        with target.open("wb") as file:  # given a path, numpy would add a suffix
-            np.save(file, np.ascontiguousarray(array), allow_pickle=False)
-
-    write_atomically(path, fill)
-
-
-def _read_array(path: Path) -> NDArray[np.floating]:
-    """Return (D, n) numbers from a .npy file; nothing in it is ever executed."""
-    if not path.is_file():
-        raise PoolError(f"The features '{path}' are missing.")
-    try:
-        stored = np.load(path, allow_pickle=False)
-        if not isinstance(stored, np.ndarray) or not np.issubdtype(stored.dtype, np.floating):
-            raise ValueError("no floating-point numbers")
-    except (OSError, ValueError, EOFError) as error:
-        raise PoolError(
-            f"The features '{path}' are damaged: they are no array of floating-point numbers."
-        ) from error
-    if stored.ndim != 2 or not stored.size:
-        raise PoolError(
-            f"The features '{path}' have the shape {stored.shape}; features by frames are needed."
-        )
-    if not np.isfinite(stored).all():
-        raise PoolError(f"The features '{path}' are not all finite numbers.")
-    return stored
-
-
-def _read_mapping(path: Path) -> tuple[str, ...]:
-    """Return the names in the order of their numbers."""
-    if not path.is_file():
-        raise PoolError(
-            f"The folder '{path.parent}' has no {path.name}, which an MS-TCN folder needs "
-            "(lines 'number name')."
-        )
-    named: dict[int, str] = {}
-    for place, line in enumerate(_read_lines(path), start=1):
-        number, _, name = line.strip().partition(" ")
-        if not number.isdecimal() or not name or int(number) in named or name in named.values():
-            raise PoolError(
-                f"Line {place} of '{path}' is '{line}'; a number and a name are needed, each new."
-            )
-        named[int(number)] = name
-    if not named:
-        raise PoolError(f"'{path}' is empty; it needs lines 'number name'.")
-    return tuple(named[number] for number in sorted(named) if named[number] != BACKGROUND)
-
-
-def _read_lines(path: Path) -> list[str]:
-    """Return the lines of a text file without the empty ones at its end."""
-    try:
-        return path.read_text(encoding="utf-8").rstrip().splitlines()
-    except OSError as error:
-        raise PoolError(f"'{path}' cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise PoolError(f"'{path}' is damaged: it is no text.") from error

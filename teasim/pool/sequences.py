@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from teasim.common.errors import PoolError
 from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder
+from teasim.pool.mstcn_labels import BACKGROUNDS
 from teasim.pool.source import Clip
 from teasim.pool.types import Span, spans_from_index
 
@@ -97,17 +98,25 @@ class SequencePool:
     """Frames (lines) per second; None where it is not known and times are counted in frames."""
     cameras: tuple[str, ...] = ()
     """None: there are no pictures."""
-    notes: tuple[str, ...] = ()
-    """Sentences on what is unusual but harms nothing."""
 
     @classmethod
-    def open(cls, path: Path | str, fps: float | None = None) -> Self:
+    def open(
+        cls,
+        path: Path | str,
+        fps: float | None = None,
+        background: tuple[str, ...] = BACKGROUNDS,
+    ) -> Self:
         """List the videos of an MS-TCN folder.
+
+        Args:
+            path: the folder.
+            fps: frames (lines) per second, if known.
+            background: labels of frames that belong to no sub-task.
 
         Raises:
             PoolError: the folder is no MS-TCN folder, or a damaged one.
         """
-        folder = MSTCNFolder.open(path)
+        folder = MSTCNFolder.open(path, background)
         episodes = [LabelledSequence(folder, name, k) for k, name in enumerate(folder.videos)]
         return cls(folder.root, folder.names, tuple(episodes), fps)
 
@@ -122,19 +131,30 @@ class SequencePool:
                 found.append(str(error))
         return found
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided where the files leave a doubt, one sentence each."""
+        return self.episodes[0].folder.notes()
+
     def content_hash(self) -> str:
         """Return a SHA-256 over the names and labels of all videos."""
         digest = hashlib.sha256("\n".join(self.subtasks).encode())
         for episode in self.episodes:
-            for folder in (TRUTH, PREDICTIONS):
-                path = self.root / folder / f"{episode.demo_id}.txt"
-                digest.update(f"\n{folder} {episode.demo_id}\n".encode())
-                digest.update(path.read_bytes() if path.exists() else b"")
+            files = (episode.folder.truth_files, episode.folder.prediction_files)
+            for kind, of_kind in zip((TRUTH, PREDICTIONS), files, strict=True):
+                digest.update(f"\n{kind} {episode.demo_id}\n".encode())
+                path = of_kind.get(episode.demo_id)
+                digest.update(b"" if path is None else path.read_bytes())
         return digest.hexdigest()
 
     def entries(self, indexes: Sequence[int]) -> list[str]:
         """Return the names of the label files, as in the folder's splits."""
-        return [f"{self.episodes[index].demo_id}.txt" for index in indexes]
+        named = []
+        for index in indexes:
+            episode = self.episodes[index]
+            file = episode.folder.truth_files.get(episode.demo_id)
+            named.append(f"{episode.demo_id}.txt" if file is None else file.name)
+        return named
 
     def usage(self, indexes: Sequence[int], *, keep: bool) -> list[str]:
         """Return the line that makes a split of the list."""

@@ -2,13 +2,20 @@
 
 from pathlib import Path
 
-from teasim.common.errors import PoolError
-from teasim.pool.hub import located, missing
-from teasim.pool.readers import lerobot, ms_tcn
+from teasim.common.errors import ConfigError, PoolError
+from teasim.pool.hub import missing
+from teasim.pool.readers import aloha, lerobot, minari, ms_tcn, robomimic, videos
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.source import Source
 
-READERS: tuple[Reader, ...] = (lerobot.READER, ms_tcn.READER)
+READERS: tuple[Reader, ...] = (
+    lerobot.READER,
+    ms_tcn.READER,
+    minari.READER,
+    aloha.READER,
+    robomimic.READER,
+    videos.READER,
+)
 """Every format that can be read."""
 
 
@@ -24,8 +31,24 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it, or it is damaged.
     """
-    place = located(path)
-    return reader_of(place).open(place, options or ReadOptions())
+    place, options = located(path), options or ReadOptions()
+    reader = reader_of(place)
+    for name in options.given():
+        if name not in reader.options:
+            raise ConfigError(
+                f"'{place}' is read as {reader.name}, which has no use for {name}; leave it out."
+            )
+    return reader.open(place, options)
+
+
+def located(path: Path | str) -> Path:
+    """Return the path itself, or where a reader finds a data set of that name."""
+    if not Path(path).exists():
+        for reader in READERS:
+            place = reader.find(str(path)) if reader.find else None
+            if place is not None:
+                return place
+    return Path(path)
 
 
 def check_source(path: Path | str, options: ReadOptions | None = None) -> list[str]:

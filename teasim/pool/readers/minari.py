@@ -1,0 +1,124 @@
+"""Minari data sets with the HDF5 back end; pictures anywhere in the observations, JPEG or plain."""
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from teasim.common.errors import PoolError
+from teasim.pool.hdf5 import arrays, clips_in, group, logs_hash, opened
+from teasim.pool.readers.reader import Reader, ReadOptions
+from teasim.pool.recordings import RecordedSource, Recording
+
+MAIN, METADATA = "main_data.hdf5", "metadata.json"
+EPISODE = re.compile(r"episode_(\d{1,9})")
+NAME = re.compile(r"([\w\-.]+/)*[\w\-.]+-v\d+")
+"""A data set id: [namespace/]name-vN."""
+DEFAULT_FPS = 20.0
+"""Frames per second where none are given [1/s]; Minari stores none."""
+
+
+def find(name: str) -> Path | None:
+    """Return the folder of a data set id below $MINARI_DATASETS_PATH or ~/.minari/datasets."""
+    if not NAME.fullmatch(name):
+        return None
+    home = os.environ.get("MINARI_DATASETS_PATH")
+    place = (Path(home) if home else Path.home() / ".minari" / "datasets") / name
+    return place if recognises(place) else None
+
+
+def recognises(path: Path) -> bool:
+    """Tell whether `path` is a data set's folder, its folder data, or its main file."""
+    return (
+        path.name == MAIN
+        or any((path / part / MAIN).is_file() for part in ("data", "."))
+        or (_is_arrow(path / "data") or _is_arrow(path))
+    )
+
+
+def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
+    """Open the data set.
+
+    Raises:
+        PoolError: it is damaged, stored as arrow files, or has no pictures.
+    """
+    folder = path.parent if path.name == MAIN else path
+    folder = folder / "data" if (folder / "data").is_dir() else folder
+    if not (folder / MAIN).is_file():
+        raise PoolError(
+            f"The Minari data set '{path}' is stored as arrow files; only hdf5 is read: write it "
+            "again with data_format='hdf5'."
+        )
+    place = folder / MAIN
+    with opened(place) as file:
+        names = sorted(filter(EPISODE.fullmatch, file), key=lambda name: int(name[8:]))
+        if not names:
+            raise PoolError(f"'{place}' has no groups episode_*, as a Minari data set has.")
+        episodes = [_recording(place, name, file[name]) for name in names]
+    common = set.intersection(*(set(episode.clips) for episode in episodes))
+    if not common:
+        raise PoolError(
+            f"'{place}' has no pictures that all episodes have, only "
+            f"{', '.join(_low_dimensional(place, names[0]))}; record them in the observations."
+        )
+    notes = (
+        ()
+        if options.fps
+        else (
+            f"A Minari data set does not store its frame rate; {DEFAULT_FPS:g} per second are "
+            "assumed, --fps says otherwise.",
+        )
+    )
+    return RecordedSource(
+        path,
+        options.fps or DEFAULT_FPS,
+        tuple(sorted(common)),
+        tuple(episodes),
+        _usage,
+        notes=notes,
+    )
+
+
+def _recording(path: Path, name: str, episode: Any) -> Recording:
+    observations = episode.get("observations")
+    if observations is None:
+        raise PoolError(f"'{path}' is damaged: '{name}' has no observations.")
+    clips = clips_in(path, observations)
+    lengths = {clip.length for clip in clips.values()}
+    if len(lengths) > 1:
+        raise PoolError(f"'{path}' is damaged: the cameras of '{name}' differ in length.")
+    logs = {key: data for key, data in arrays(episode) if key.startswith(("act", "obs"))}
+    number = str(episode.attrs.get("id", name[8:]))
+    return Recording(
+        index=int(name[8:]),
+        name=name,
+        length=lengths.pop() if lengths else 0,
+        clips=clips,
+        entry=number,
+        content=logs_hash(path, logs),
+    )
+
+
+def _low_dimensional(path: Path, name: str) -> list[str]:
+    with opened(path) as file:
+        return [key for key, _ in arrays(group(file, name))][:5]
+
+
+def _is_arrow(folder: Path) -> bool:
+    try:
+        told = json.loads((folder / METADATA).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(told, dict) and told.get("data_format") == "arrow"
+
+
+def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
+    del root
+    word = "in" if keep else "not in"
+    numbers = ", ".join(entries)
+    return [f"Minari:    dataset.filter_episodes(lambda episode: episode.id {word} [{numbers}])"]
+
+
+READER = Reader("Minari data set", recognises, open_folder, ("fps",), find)

@@ -1,0 +1,130 @@
+"""A source of demonstrations with pictures that other tools recorded: videos, HDF5 files.
+
+Readers of such formats make `Recording`s and hand them to `RecordedSource`.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from teasim.common.errors import PoolError
+from teasim.pool.source import Clip
+from teasim.pool.types import Span
+
+ID_DIGITS = 16
+
+Usage = Callable[[Path, Sequence[str], bool], list[str]]
+"""(root, entries, keep): command lines that make other tools keep or leave out the entries."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One demonstration that another tool recorded."""
+
+    index: int
+    """Number in the source, which other tools of its format know it by."""
+    name: str
+    """What it is called in the source."""
+    length: int
+    """Number of frames."""
+    clips: Mapping[str, Clip]
+    """Pictures by camera."""
+    entry: str
+    """How other tools of the format name it."""
+    content: str = ""
+    """Hash of its logs; empty where there are none and its pictures tell who it is."""
+    labels: tuple[Span, ...] = ()
+    """Logged sub-task spans in order of time."""
+    task: str = ""
+    """The task as a sentence; empty when it is not stored."""
+    record: None = None
+    """Whether it is correct is not stored."""
+
+    @property
+    def demo_id(self) -> str:
+        """Hash of the logs and pictures; name, number and labels stay out.
+
+        Raises:
+            PoolError: a file is missing or damaged.
+        """
+        digests = sorted(clip.digest() for clip in self.clips.values())
+        content = "\n".join([self.content, *digests])
+        return hashlib.sha256(content.encode()).hexdigest()[:ID_DIGITS]
+
+    def spans(self) -> tuple[Span, ...]:
+        """Return the logged sub-task spans in order of time."""
+        return self.labels
+
+    def predicted_spans(self) -> tuple[Span, ...]:
+        """Return none: no predictions are stored."""
+        return ()
+
+    def posteriors(self) -> np.ndarray | None:
+        """Return None: no predictions are stored."""
+        return None
+
+    def clip(self, camera: str) -> Clip:
+        """Return where the pictures by `camera` are.
+
+        Raises:
+            PoolError: the source has no such camera.
+        """
+        if camera not in self.clips:
+            known = ", ".join(self.clips)
+            raise PoolError(f"'{self.name}' has no camera '{camera}'; it has {known}.")
+        return self.clips[camera]
+
+
+@dataclass(frozen=True)
+class RecordedSource:
+    """Demonstrations that another tool recorded; nothing is modified."""
+
+    root: Path
+    """Folder or file it was opened from."""
+    fps: float
+    """Frames per second."""
+    cameras: tuple[str, ...]
+    """Names of the cameras."""
+    episodes: tuple[Recording, ...]
+    """The demonstrations in the order of their index."""
+    usage_lines: Usage
+    """Makes the lines that `usage` returns."""
+    subtasks: tuple[str, ...] = ()
+    """Names of the logged sub-tasks; empty without labels."""
+    notes: tuple[str, ...] = ()
+    """Sentences on what is unusual but harms no demonstration."""
+
+    def problems(self) -> list[str]:
+        """Return a sentence for each demonstration whose pictures cannot be read."""
+        found = []
+        for episode in self.episodes:
+            try:
+                for clip in episode.clips.values():
+                    clip.digest()
+            except PoolError as error:
+                found.append(str(error))
+        return found
+
+    def content_hash(self) -> str:
+        """Return a SHA-256 over identities, pictures and labels of all demonstrations.
+
+        Raises:
+            PoolError: a file is missing or damaged.
+        """
+        digest = hashlib.sha256(repr((self.fps, self.subtasks)).encode())
+        for episode in self.episodes:
+            pictures = [(camera, clip.digest()) for camera, clip in sorted(episode.clips.items())]
+            digest.update(repr((episode.demo_id, pictures, episode.labels)).encode())
+        return digest.hexdigest()
+
+    def entries(self, indexes: Sequence[int]) -> list[str]:
+        """Return how other tools of the format name the demonstrations."""
+        named = {episode.index: episode.entry for episode in self.episodes}
+        return [named[index] for index in indexes]
+
+    def usage(self, indexes: Sequence[int], *, keep: bool) -> list[str]:
+        """Return command lines that make other tools keep, or leave out, the demonstrations."""
+        return self.usage_lines(self.root, self.entries(indexes), keep) if indexes else []
