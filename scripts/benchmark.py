@@ -1,7 +1,7 @@
 """Measure what pictures, demonstrations and environment steps cost, in processor time.
 
-Generation and environment steps are compared with a floor measured in the same run, by turns: the
-same physics steps, the same pictures and the same encoded frames in bare loops.
+Generation, decoding and environment steps are compared with a floor measured in the same run, by
+turns: the same physics steps, pictures, encoded and decoded frames in bare loops.
 """
 
 import argparse
@@ -10,6 +10,7 @@ import os
 import resource
 import tempfile
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from teasim.common.parallel import WORKER_ENVIRONMENT
 
 os.environ.update(WORKER_ENVIRONMENT)  # one thread, before OpenGL and NumPy start
 
+import av
 import gymnasium
 import mujoco
 import numpy as np
@@ -30,7 +32,7 @@ from teasim.constants import (
 )
 from teasim.generate import GenerateConfig, demo_rng, plan_pool
 from teasim.generate.recording import generate_demo
-from teasim.pool.clips import VideoWriter
+from teasim.pool.clips import VideoClip, VideoWriter
 from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
 from teasim.world.simulation import Simulation
@@ -38,6 +40,7 @@ from teasim.world.station import nominal_layout
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 ENVIRONMENT_STEPS = 200
+DECODED_FRAMES = 300
 
 
 @dataclass
@@ -164,6 +167,36 @@ def bare_demonstration(folder: Path, config: GenerateConfig, recording: Recordin
         video.close()
 
 
+def decoding(size: int, repeats: int) -> dict[str, float]:
+    """Milliseconds per decoded frame, those of PyAV's bare loop, and their ratio."""
+    frames = DECODED_FRAMES
+    rng = np.random.default_rng(0)
+    noise = rng.integers(0, 256, (size // 8, size // 8 + frames, 3), dtype=np.uint8)
+    picture = noise.repeat(8, axis=0).repeat(8, axis=1)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "video.mp4"
+        writer = VideoWriter(path, height=picture.shape[0], width=size, fps=FPS)
+        for shift in range(frames):
+            writer.add(picture[:, shift : shift + size])
+        writer.close()
+        clip = VideoClip.whole(path)
+        works: dict[str, Callable[[], object]] = {
+            "clip": lambda: deque(clip.stream(range(frames)), maxlen=0),
+            "floor": lambda: bare_decoding(path),
+        }
+        found = medians(works, repeats)
+    spent = {f"{name} per frame": 1000 * value / frames for name, value in found.items()}
+    return spent | {"ratio": found["clip"] / found["floor"]}
+
+
+def bare_decoding(path: Path) -> None:
+    """Convert every frame of a video to RGB, and nothing else."""
+    with av.open(str(path)) as container:
+        container.streams.video[0].thread_type = "NONE"
+        for frame in container.decode(video=0):
+            frame.to_ndarray(format="rgb24")
+
+
 def environment(repeats: int) -> dict[str, float]:
     """Steps per second of the joint environment and of its physics alone, and their ratio."""
     env = gymnasium.make("teasim:teasim/TeaMaking-v0", max_episode_steps=10**9)
@@ -213,6 +246,7 @@ def main() -> None:
     results = {
         "pictures [ms]": pictures(given.size, given.repeats),
         "generation [s]": generation(given.size, given.repeats),
+        "decoding [ms]": decoding(given.size, given.repeats),
         "joint environment": environment(given.repeats),
     }
     show(results)

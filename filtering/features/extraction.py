@@ -107,6 +107,6 @@ def _frames_of(task: VideoTask) -> NDArray[np.int64]:
 
 
 def _key(task: VideoTask) -> str:
-    """Hash the encoded frames of the clip, which of them are used, and all that is done to them."""
+    """Hash the decoded frames of the clip, which of them are used, and all that is done to them."""
     used = _frames_of(task).tolist()
     return clip_key(task.clip, [task.background, OVERVIEW, task.clip.length, used])

@@ -69,11 +69,11 @@ def _mp4_of(clip: Clip, fps: float) -> bytes:
     stored = clip.mp4()
     if stored is not None:
         return stored
-    frames = clip.frames(np.arange(clip.length))
+    height, width, _ = clip.frames([0])[0].shape
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
-        writer = VideoWriter(path, height=frames.shape[1], width=frames.shape[2], fps=round(fps))
-        for image in frames:
+        writer = VideoWriter(path, height=height, width=width, fps=fps)
+        for image in clip.stream(np.arange(clip.length)):
             writer.add(image)
         writer.close()
         return path.read_bytes()

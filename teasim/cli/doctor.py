@@ -15,6 +15,7 @@ import tyro
 
 from teasim.common.parallel import default_jobs
 from teasim.gl import BACKENDS, FIXES, Probe, probe
+from teasim.pool.clips import VideoClip, VideoWriter, probe_codecs
 
 PACKAGES = (
     "teasim",
@@ -73,7 +74,9 @@ class Report:
     rendering: tuple[Probe, ...]
     """One entry per back end."""
     video: VideoProbe
-    """h264 there and back."""
+    """h264 there and back, as pools are written."""
+    codecs: dict[str, str | None]
+    """Per codec what keeps its videos from being read; None where all is well."""
     packages: dict[str, str | None]
     """Version of each package that matters for repeating a result; None where it is missing."""
     fixes: tuple[str, ...]
@@ -94,28 +97,29 @@ def examine() -> Report:
     names = BACKENDS if wish in ("", *BACKENDS) else (wish, *BACKENDS)
     rendering = tuple(probe(name) for name in names)
     working = [p.backend for p in rendering if p.ok and wish in ("", p.backend)]
-    video = probe_video()
+    video, codecs = probe_video(), probe_codecs()
     packages = {name: _version(name) for name in PACKAGES}
     return Report(
-        ok=bool(working) and video.ok,
+        ok=bool(working) and video.ok and not any(codecs.values()),
         python=platform.python_version(),
         system=f"{platform.system()} {platform.machine()}",
         cpus=default_jobs(),
         gl=working[0] if working else None,
         rendering=rendering,
         video=video,
+        codecs=codecs,
         packages=packages,
-        fixes=_fixes(wish, bool(working), video.ok),
+        fixes=_fixes(wish, bool(working), video.ok and not any(codecs.values())),
     )
 
 
 def probe_video() -> VideoProbe:
-    """Encode a moving gradient as h264 with imageio-ffmpeg and decode it with OpenCV."""
+    """Encode a moving gradient as h264 with imageio-ffmpeg and decode it with PyAV."""
     frames = _gradient()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "probe.mp4"
         try:
-            import cv2  # noqa: F401  (loaded here so that the clock does not see it)
+            import av  # noqa: F401  (loaded here so that the clock does not see it)
             import imageio_ffmpeg  # noqa: F401
 
             start = time.perf_counter()
@@ -142,25 +146,15 @@ def _gradient() -> np.ndarray:
 
 
 def _encode(path: Path, frames: np.ndarray) -> None:
-    import imageio_ffmpeg
-
-    writer = imageio_ffmpeg.write_frames(
-        str(path), (_SIDE, _SIDE), fps=_FPS, codec="libx264", output_params=["-threads", "1"]
-    )
-    writer.send(None)
+    writer = VideoWriter(path, height=_SIDE, width=_SIDE, fps=_FPS)
     for frame in frames:
-        writer.send(np.ascontiguousarray(frame))
+        writer.add(frame)
     writer.close()
 
 
 def _decode(path: Path) -> np.ndarray:
-    import cv2
-
-    capture, frames = cv2.VideoCapture(str(path)), []
-    while (answer := capture.read())[0]:
-        frames.append(cv2.cvtColor(answer[1], cv2.COLOR_BGR2RGB))
-    capture.release()
-    return np.stack(frames) if frames else np.empty((0, _SIDE, _SIDE, 3), np.uint8)
+    clip = VideoClip.whole(path)
+    return clip.frames(np.arange(clip.length))
 
 
 def _version(package: str) -> str | None:
@@ -177,7 +171,7 @@ def _fixes(wish: str, renders: bool, makes_videos: bool) -> tuple[str, ...]:
     elif not renders:
         fixes.append(FIXES[wish or "egl"])
     if not makes_videos:
-        fixes.append("pip install --force-reinstall imageio-ffmpeg opencv-python-headless")
+        fixes.append("pip install --force-reinstall imageio-ffmpeg av")
     return tuple(fixes)
 
 
@@ -189,7 +183,10 @@ def _text(report: Report) -> str:
         lines.append(f"  {_mark(result.ok)}  {result.backend:<7} {outcome}{used}")
     video = report.video
     outcome = f"{video.ms_per_frame} ms per 224x224 frame, both ways" if video.ok else video.problem
-    lines += ["video", f"  {_mark(video.ok)}  {'h264':<7} {outcome}", "packages"]
+    lines += ["video", f"  {_mark(video.ok)}  {'h264':<7} {outcome}", "reading"]
+    for codec, problem in report.codecs.items():
+        lines.append(f"  {_mark(problem is None)}  {codec:<7} {problem or 'is read exactly'}")
+    lines.append("packages")
     lines += [f"  {name:<24} {found or 'missing'}" for name, found in report.packages.items()]
     lines += ["", *(f"To mend it, run: {fix}" for fix in report.fixes)]
     if report.ok:

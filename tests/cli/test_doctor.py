@@ -3,10 +3,12 @@
 import json
 from dataclasses import replace
 
+import av
 import pytest
 
 from teasim.cli import doctor
 from teasim.gl import Probe
+from teasim.pool.clips.codecs import ENCODERS, probe_codecs
 
 WORKS = Probe("egl", True, 2.5, None)
 FAILS = Probe("osmesa", False, None, "libOSMesa.so.8 is missing")
@@ -18,13 +20,14 @@ BAD_VIDEO = doctor.VideoProbe(False, None, "OSError: no ffmpeg")
 def machine(monkeypatch):
     """A machine of our making: set which back ends render and whether videos work."""
 
-    def build(*, renders=("egl",), video=GOOD_VIDEO, wish=None):
+    def build(*, renders=("egl",), video=GOOD_VIDEO, codecs=None, wish=None):
         def probe(backend):
             works = backend in renders
             return replace(WORKS if works else FAILS, backend=backend)
 
         monkeypatch.setattr(doctor, "probe", probe)
         monkeypatch.setattr(doctor, "probe_video", lambda: video)
+        monkeypatch.setattr(doctor, "probe_codecs", lambda: codecs or {"h264": None, "av1": None})
         if wish is None:
             monkeypatch.delenv("MUJOCO_GL", raising=False)
         else:
@@ -46,6 +49,7 @@ def test_json_names_types_and_code_when_all_is_well(machine, capsys):
         "gl": "str",
         "rendering": "list",
         "video": "dict",
+        "codecs": "dict",
         "packages": "dict",
         "fixes": "list",
     }
@@ -81,6 +85,32 @@ def test_without_video_the_code_is_1_and_the_text_ends_with_the_fix(machine, cap
     out = capsys.readouterr().out
     assert "--  h264    OSError: no ffmpeg" in out
     assert out.splitlines()[-1].startswith("To mend it, run: pip install ")
+
+
+def test_a_codec_that_is_not_read_is_told_with_the_fix(machine, capsys):
+    machine(codecs={"h264": None, "av1": "PyAV was built without its decoder"})
+    assert doctor.main([]) == 1
+    out = capsys.readouterr().out
+    assert "ok  h264    is read exactly" in out
+    assert "--  av1     PyAV was built without its decoder" in out
+    assert out.splitlines()[-1] == (
+        "To mend it, run: pip install --force-reinstall imageio-ffmpeg av"
+    )
+
+
+def test_every_codec_is_read_on_this_machine(capfd):
+    assert probe_codecs() == dict.fromkeys(("h264", "hevc", "av1", "vp9", "mpeg4"))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("codec", ["h264", "av1"])
+def test_a_codec_without_decoder_or_encoder_is_found(monkeypatch, codec):
+    encoder, _ = ENCODERS[codec]
+    monkeypatch.setattr("av.codecs_available", av.codecs_available - {codec})
+    assert probe_codecs()[codec] == "PyAV was built without its decoder"
+    monkeypatch.undo()
+    monkeypatch.setattr("av.codecs_available", av.codecs_available - {encoder})
+    assert codec not in probe_codecs()
 
 
 def test_the_text_of_a_healthy_machine(machine, capsys):

@@ -124,10 +124,46 @@ def fill(writer: VideoWriter) -> None:
 
 
 @pytest.mark.parametrize("use", [fill, VideoWriter.close])
-def test_an_encoder_that_cannot_write_is_told(
+def test_an_encoder_that_cannot_write_tells_why(
     tmp_path: Path, use: Callable[[VideoWriter], None]
 ) -> None:
     writer = VideoWriter(tmp_path / "no folder" / "x.mp4", height=SIZE, width=SIZE, fps=FPS)
-    with pytest.raises(PoolError, match=r"^The encoder stopped while writing '.*'; check the free"):
+    with pytest.raises(PoolError, match=r"^The encoder stopped while writing '.*': .*No such file"):
         use(writer)
     writer.abort()
+
+
+def test_an_encoder_that_is_killed_tells_its_code(tmp_path: Path) -> None:
+    writer = VideoWriter(tmp_path / "x.mp4", height=SIZE, width=SIZE, fps=FPS)
+    writer._process.kill()
+    writer._process.wait()
+    with pytest.raises(PoolError, match=r"x\.mp4': it ended with code -9\.$"):
+        fill(writer)
+    writer.abort()
+
+
+def test_a_frame_of_another_shape_is_refused(tmp_path: Path) -> None:
+    writer = VideoWriter(tmp_path / "x.mp4", height=SIZE, width=SIZE, fps=FPS)
+    for image in (np.zeros((SIZE, SIZE + 1, 3), np.uint8), np.zeros((SIZE, SIZE, 3))):
+        with pytest.raises(ValueError, match=r"not uint8 \(32, 32, 3\)\.$"):
+            writer.add(image)
+    writer.abort()
+
+
+@pytest.mark.parametrize(("height", "width"), [(47, 63), (48, 63), (47, 64)])
+def test_odd_sizes_repeat_the_last_row_and_column(tmp_path: Path, height: int, width: int) -> None:
+    image = np.full((height, width, 3), 40, np.uint8)
+    image[-8:, -8:] = 200
+    path = write_video(tmp_path / "odd.mp4", np.stack([image] * 3))
+    frames = VideoClip.whole(path).frames(range(3))
+    assert frames.shape == (3, 48, 64, 3)
+    assert np.abs(frames[:, :height, :width].astype(int) - image).mean() < 2
+    assert (frames[:, -4:, -4:] > 180).all()
+
+
+@pytest.mark.parametrize("fps", [1, 30, 29.97, 0.5])
+def test_the_rate_of_the_file_is_the_one_given(tmp_path: Path, fps: float) -> None:
+    writer = VideoWriter(tmp_path / "x.mp4", height=SIZE, width=SIZE, fps=fps)
+    fill(writer)
+    writer.close()
+    assert probe(tmp_path / "x.mp4").fps == pytest.approx(fps, rel=1e-5)

@@ -23,6 +23,7 @@ from teasim.pool.readers.robomimic import term_spans
 from teasim.pool.readers.videos import natural
 from tests.pool import foreign_inputs as made
 
+READERS_BY_NAME = {reader.name: reader for reader in READERS}
 HDF5 = ["robomimic", "minari_jpeg", "minari_plain", "aloha", "aloha_jpeg"]
 
 
@@ -144,7 +145,10 @@ def test_damage_is_one_sentence(inputs: dict[str, Path], name: str, tmp_path: Pa
     victim = next(p for p in files if p.suffix in (".hdf5", ".mp4"))
     victim.write_bytes(victim.read_bytes()[: victim.stat().st_size // 3])
     said = refusal(path)
-    assert said.startswith((f"The HDF5 file '{victim}' is dam", f"The video '{victim}' "))
+    check = READERS_BY_NAME[made.ALL[name][1]].check
+    assert check is not None
+    assert check(path) == [said]
+    assert said.startswith((f"The file '{victim}' is dam", f"The video '{victim}' "))
 
 
 @pytest.mark.parametrize("name", HDF5)
@@ -153,10 +157,8 @@ def test_without_h5py_the_install_line_is_told(
 ) -> None:
     monkeypatch.setitem(sys.modules, "h5py", None)
     said = refusal(inputs[name])
-    assert said.startswith("'")
-    assert said.endswith(
-        "' is an HDF5 file, which h5py reads; install it with `pip install teasim[hdf5]`."
-    )
+    assert said.startswith("Reading '")
+    assert said.endswith("' needs h5py; install it with: pip install 'teasim[hdf5]'.")
 
 
 @pytest.mark.parametrize(
@@ -184,6 +186,25 @@ def test_read_options_fit_into_the_settings_of_a_verb() -> None:
 
     found = tyro.cli(Settings, args=["--fps", "5", "--background-label", "rest", "--mask", "m"])
     assert found.read == ReadOptions(5.0, "m", ("rest",))
+
+
+@pytest.mark.parametrize("name", ["aloha_jpeg", "minari_jpeg"])
+def test_a_picture_that_does_not_decode_is_found(
+    inputs: dict[str, Path], name: str, tmp_path: Path
+) -> None:
+    check = READERS_BY_NAME[made.ALL[name][1]].check
+    assert check is not None
+    assert check(inputs[name]) == []
+    path = copy(inputs, name, tmp_path / "copy")
+    file_path = path / ("episode_1.hdf5" if name == "aloha_jpeg" else "data/main_data.hdf5")
+    with h5py.File(file_path, "a") as file:
+        where = "observations/images/cam_high"
+        rows = file[where if name == "aloha_jpeg" else "episode_1/observations/views/pixels"]
+        rows[3] = np.zeros(len(rows[3]), np.uint8)
+        where = rows.name
+    assert check(path) == [
+        f"The picture '{where}' of frame 3 in '{file_path}' is damaged or missing."
+    ]
 
 
 # robomimic
@@ -271,7 +292,7 @@ def test_an_array_that_claims_too_much_is_not_read(tmp_path: Path) -> None:
         shape = (7, 5000, 5000, 3)
         file.create_dataset("data/demo_2/obs/wrist_rgb", shape, np.uint8, chunks=(1, 50, 50, 3))
     assert refusal(path) == (
-        f"The HDF5 file '{path}' is damaged: '/data/demo_2/obs/wrist_rgb' claims 525000000 bytes "
+        f"The file '{path}' is damaged: '/data/demo_2/obs/wrist_rgb' claims 525000000 bytes "
         "but 0 are stored."
     )
 

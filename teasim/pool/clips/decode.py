@@ -195,12 +195,18 @@ def _open_container(path: Path) -> Any:
 
 
 def _video_stream(path: Path, container: Any) -> Any:
-    if not container.streams.video:
+    import av
+
+    cover = av.stream.Disposition.attached_pic
+    streams = [stream for stream in container.streams.video if not stream.disposition & cover]
+    if not streams:
         raise PoolError(f"The file '{path}' holds no video.")
-    stream = container.streams.video[0]
-    if stream.codec_context is None:  # the file names a codec that does not exist
-        container.close()
-        raise damaged(path)
+    stream = streams[0]
+    if stream.codec_context is None:
+        raise PoolError(
+            f"The video '{path}' is damaged or in a codec that PyAV cannot decode; "
+            f"teasim doctor tells which ones it can."
+        )
     check_size(path, stream.codec_context.width, stream.codec_context.height)
     stream.thread_type = "NONE"  # the worker processes are the parallelism
     stream.codec_context.thread_count = 1

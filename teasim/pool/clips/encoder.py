@@ -5,7 +5,10 @@ One thread and no version in the file: the same frames give the same bytes.
 
 import contextlib
 import subprocess
+import tempfile
+from fractions import Fraction
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -21,26 +24,39 @@ ENCODER = [
 
 
 class VideoWriter:
-    """Encodes frames to h264 yuv420p; equal frames give equal bytes."""
+    """Encodes frames to h264 yuv420p; equal frames give equal bytes.
 
-    def __init__(self, path: Path, *, height: int, width: int, fps: int) -> None:
+    That format needs even sizes: of an odd one the last row or column is repeated.
+    """
+
+    def __init__(self, path: Path, *, height: int, width: int, fps: float) -> None:
         """Start the encoder for frames of `height` x `width` pixels.
 
         Raises:
             PoolError: ffmpeg cannot be started.
         """
         self._path = path
-        self._process = _start_encoder(path, height, width, fps)
+        self._shape = (height, width, 3)
+        self._padding = ((0, height % 2), (0, width % 2), (0, 0))
+        self._messages = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the writer)
+        size = f"{width + width % 2}x{height + height % 2}"
+        rate = str(Fraction(fps).limit_denominator(1001))
+        source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", rate, "-i", "-"]
+        self._process = _start_ffmpeg([*source, *ENCODER, str(path)], self._messages)
 
     def add(self, image: np.ndarray) -> None:
         """Append an (H, W, 3) uint8 RGB image.
 
         Raises:
             PoolError: The encoder stopped, for instance because the disk is full.
+            ValueError: The image has another shape or type.
         """
+        if image.shape != self._shape or image.dtype != np.uint8:
+            raise ValueError(f"A frame is {image.dtype} {image.shape}, not uint8 {self._shape}.")
         assert self._process.stdin is not None
+        padded = np.pad(image, self._padding, mode="edge") if np.any(self._padding) else image
         try:
-            self._process.stdin.write(np.ascontiguousarray(image).data)
+            self._process.stdin.write(np.ascontiguousarray(padded).data)
         except OSError as error:
             raise self._failure() from error
 
@@ -55,27 +71,34 @@ class VideoWriter:
             self._process.stdin.close()
         if self._process.wait() != 0:
             raise self._failure()
+        self._messages.close()
 
     def abort(self) -> None:
         """Stop the encoder; what is left of the file is of no use."""
         self._process.kill()
         with contextlib.suppress(OSError):
             self._process.communicate()
+        self._messages.close()
 
     def _failure(self) -> PoolError:
-        return PoolError(
-            f"The encoder stopped while writing '{self._path}'; check the free space of the disk."
-        )
+        """Return what is said, with the last line that ffmpeg wrote."""
+        code = self._process.wait()
+        reason = f"it ended with code {code}"
+        if not self._messages.closed:
+            self._messages.seek(0)
+            lines = self._messages.read().decode(errors="replace").strip().splitlines()
+            reason = lines[-1].strip().rstrip(".") if lines else reason
+        return PoolError(f"The encoder stopped while writing '{self._path}': {reason}.")
 
 
-def _start_encoder(path: Path, height: int, width: int, fps: int) -> "subprocess.Popen[bytes]":
+def _start_ffmpeg(arguments: list[str], messages: IO[bytes]) -> "subprocess.Popen[bytes]":
     from imageio_ffmpeg import get_ffmpeg_exe
 
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(fps)]
     try:
         return subprocess.Popen(
-            [get_ffmpeg_exe(), "-v", "quiet", "-y", *source, "-i", "-", *ENCODER, str(path)],
+            [get_ffmpeg_exe(), "-v", "error", "-y", *arguments],
             stdin=subprocess.PIPE,
+            stderr=messages,
         )
     except (OSError, RuntimeError) as error:
         raise PoolError(f"The encoder ffmpeg cannot be started: {error}.") from error

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from teasim.common.errors import PoolError
-from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash, opened, root_names
+from teasim.pool.clips.hdf5 import opened
+from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash, root_names
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.readers.videos import natural
-from teasim.pool.recordings import RecordedSource, Recording
+from teasim.pool.recordings import RecordedSource, Recording, unreadable
 
 DEFAULT_FPS = 50.0
 """ALOHA's control frequency [1/s] (Zhao et al. 2023, DT = 0.02 s); the files do not store it."""
@@ -69,4 +70,9 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     return [f"ALOHA:     {word} these files of '{root}': {' '.join(entries)}"]
 
 
-READER = Reader("folder of ALOHA episodes", recognises, open_folder, ("fps",))
+def check(path: Path) -> list[str]:
+    """Decode every picture and return a sentence for each damage."""
+    return unreadable(lambda: open_folder(path, ReadOptions()))
+
+
+READER = Reader("folder of ALOHA episodes", recognises, open_folder, check, options=("fps",))

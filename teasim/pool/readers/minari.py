@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from teasim.common.errors import PoolError
-from teasim.pool.hdf5 import arrays, clips_in, group, logs_hash, opened
+from teasim.pool.clips.hdf5 import opened
+from teasim.pool.hdf5 import arrays, clips_in, group, logs_hash
 from teasim.pool.readers.reader import Reader, ReadOptions
-from teasim.pool.recordings import RecordedSource, Recording
+from teasim.pool.recordings import RecordedSource, Recording, unreadable
 
 MAIN, METADATA = "main_data.hdf5", "metadata.json"
 EPISODE = re.compile(r"episode_(\d{1,9})")
@@ -121,4 +122,9 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     return [f"Minari:    dataset.filter_episodes(lambda episode: episode.id {word} [{numbers}])"]
 
 
-READER = Reader("Minari data set", recognises, open_folder, ("fps",), find)
+def check(path: Path) -> list[str]:
+    """Decode every picture and return a sentence for each damage."""
+    return unreadable(lambda: open_folder(path, ReadOptions()))
+
+
+READER = Reader("Minari data set", recognises, open_folder, check, options=("fps",), find=find)

@@ -27,4 +27,4 @@ def open_folder(path: Path, options: ReadOptions) -> SequencePool:
     return pool
 
 
-READER = Reader("MS-TCN folder", is_mstcn_folder, open_folder, ("fps", "background_label"))
+READER = Reader("MS-TCN folder", is_mstcn_folder, open_folder, options=("fps", "background_label"))

@@ -44,6 +44,10 @@ class Reader:
     """Whether a path holds this format, be it a damaged one; it reads no more than it has to."""
     open: Callable[[Path, ReadOptions], Source]
     """Opens the path; raises PoolError when it is damaged and ConfigError for a wrong option."""
+    check: Callable[[Path], list[str]] | None = None
+    """Looks for damage in all of it, pictures included, and returns a sentence for each; raises
+    PoolError when there is nothing to look at. None: its files have no pictures to decode, and
+    what `Source.problems` tells is all."""
     options: tuple[str, ...] = ("fps",)
     """Fields of `ReadOptions` that `open` looks at; any other one that is given is refused."""
     find: Callable[[str], Path | None] | None = None

@@ -31,7 +31,7 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it, or it is damaged.
     """
-    place, options = located(path), options or ReadOptions()
+    place, options = found_by_reader(path), options or ReadOptions()
     reader = reader_of(place)
     for name in options.given():
         if name not in reader.options:
@@ -41,7 +41,7 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
     return reader.open(place, options)
 
 
-def located(path: Path | str) -> Path:
+def found_by_reader(path: Path | str) -> Path:
     """Return the path itself, or where a reader finds a data set of that name."""
     if not Path(path).exists():
         for reader in READERS:

@@ -3,26 +3,19 @@
 import json
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool.hdf5 import (
-    DatasetClip,
-    arrays,
-    clips_in,
-    files_in,
-    group,
-    library,
-    logs_hash,
-    opened,
-)
+from teasim.pool.clips.hdf5 import library, opened
+from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash
 from teasim.pool.readers import aloha, minari
 from teasim.pool.readers.reader import Reader, ReadOptions
-from teasim.pool.recordings import RecordedSource, Recording
+from teasim.pool.recordings import RecordedSource, Recording, unreadable
+from teasim.pool.source import Clip
 from teasim.pool.types import Span
 
 DEMO = re.compile(r"demo_(\d{1,9})")
@@ -93,7 +86,7 @@ def _number(name: str) -> int:
     return int(name.partition("_")[2])
 
 
-def _recording(path: Path, demo: Any, clips: dict[str, DatasetClip], task: str) -> Recording:
+def _recording(path: Path, demo: Any, clips: Mapping[str, Clip], task: str) -> Recording:
     name = demo.name.rpartition("/")[2]
     lengths = {clip.length for clip in clips.values()}
     actions = demo.get("actions")
@@ -121,7 +114,7 @@ def _recording(path: Path, demo: Any, clips: dict[str, DatasetClip], task: str) 
 
 def _cameras(
     path: Path, data: Any, names: Sequence[str]
-) -> tuple[tuple[str, ...], dict[str, dict[str, DatasetClip]], list[str]]:
+) -> tuple[tuple[str, ...], Mapping[str, Mapping[str, Clip]], list[str]]:
     """Return the cameras that all demonstrations have, the clips of each, and notes."""
     clips = {name: clips_in(path, group(data[name], "obs")) for name in names}
     seen = [set(found) for found in clips.values() if found]
@@ -216,4 +209,9 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     ]
 
 
-READER = Reader("robomimic file", recognises, open_file, ("fps", "mask"))
+def check(path: Path) -> list[str]:
+    """Decode every picture and return a sentence for each damage."""
+    return unreadable(lambda: open_file(path, ReadOptions()))
+
+
+READER = Reader("robomimic file", recognises, open_file, check, options=("fps", "mask"))

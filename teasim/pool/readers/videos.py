@@ -13,7 +13,7 @@ from pathlib import Path
 from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip, VideoInfo, probe
 from teasim.pool.readers.reader import Reader, ReadOptions
-from teasim.pool.recordings import RecordedSource, Recording
+from teasim.pool.recordings import RecordedSource, Recording, unreadable
 
 SUFFIXES = frozenset(
     [
@@ -209,4 +209,9 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     ]
 
 
-READER = Reader("folder of videos", recognises, open_folder, ())
+def check(path: Path) -> list[str]:
+    """Decode every picture and return a sentence for each damage."""
+    return unreadable(lambda: open_folder(path, ReadOptions()))
+
+
+READER = Reader("folder of videos", recognises, open_folder, check, options=())
