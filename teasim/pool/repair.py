@@ -6,6 +6,7 @@ fit. What is damaged is set aside in the copy, never deleted.
 
 import shutil
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from teasim.pool.hub import located
 from teasim.pool.integrity import check_episodes, check_pool
 from teasim.pool.lerobot.episode import Episode
 from teasim.pool.lerobot.reader import Pool
-from teasim.pool.lerobot.rewriting import rewrite
+from teasim.pool.lerobot.rewriting import rewrite, write_rows
 from teasim.pool.lerobot.soundness import Problem
 
 SET_ASIDE = "damaged"
@@ -88,7 +89,7 @@ def _files(episode: Episode) -> list[Path]:
 
 
 def _set_aside(pool: Pool, reasons: dict[int, tuple[str, ...]], folder: Path) -> None:
-    """Copy the files of damaged demonstrations that no sound one uses, and say why."""
+    """Copy the files of damaged demonstrations that no sound one uses, their rows, and say why."""
     if not reasons:
         return
     used = {path for e in pool.episodes if e.index not in reasons for path in _files(e)}
@@ -100,6 +101,8 @@ def _set_aside(pool: Pool, reasons: dict[int, tuple[str, ...]], folder: Path) ->
                 copy = folder / path.relative_to(pool.root)
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(path, copy)
+        with suppress(PoolError):  # a log that is not readable was copied whole
+            write_rows(episode, folder / "rows" / f"episode_{episode.index:06d}.parquet")
     described = [
         {"episode_index": index, "problems": list(texts)} for index, texts in reasons.items()
     ]

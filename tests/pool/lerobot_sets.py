@@ -1,4 +1,4 @@
-"""Small LeRobot data sets as other tools write them; the grey level of a frame tells which it is."""
+"""Small LeRobot data sets as other tools write them; grey levels tell the frames apart."""
 
 import io
 import json

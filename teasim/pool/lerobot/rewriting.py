@@ -56,6 +56,18 @@ def rewrite(pool: Pool, kept: Sequence[int], target: Path) -> None:
         write_json(target / layout.MANIFEST, _manifest(pool, episodes, target))
 
 
+def write_rows(episode: Episode, target: Path) -> None:
+    """Write the rows that a data file has of a demonstration, as they are.
+
+    Raises:
+        PoolError: The file is missing or damaged.
+    """
+    rows = episode.log_rows()
+    table = read_table(rows.path).take(pa.array(rows.places))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_table(target, table)
+
+
 def _copy_documents(root: Path, target: Path) -> None:
     """What is said about the data set as a whole: files at the top and in meta."""
     for folder in (Path(), Path("meta")):
