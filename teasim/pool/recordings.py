@@ -5,14 +5,15 @@ Readers of such formats make `Recording`s and hand them to `RecordedSource`.
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from teasim.common.errors import PoolError
+from teasim.pool.hdf5_logs import StoredLog
 from teasim.pool.source import Clip
-from teasim.pool.types import Span
+from teasim.pool.types import GroundTruth, Span
 
 ID_DIGITS = 16
 
@@ -40,12 +41,24 @@ class Recording:
     """Logged sub-task spans in order of time."""
     task: str = ""
     """The task as a sentence; empty when it is not stored."""
-    record: None = None
-    """Whether it is correct is not stored."""
+    record: GroundTruth | None = None
+    """What is known about it; None unless it was converted from a pool that tells."""
+    logs: Mapping[str, StoredLog] = field(default_factory=dict)
+    """Logs of numbers by name."""
+    identity: str = ""
+    """Stored identity of a demonstration that was converted; empty when none is stored."""
 
     @property
     def demo_id(self) -> str:
-        """Hash of the logs and pictures; name, number and labels stay out.
+        """The stored identity, else a hash of logs and pictures; name and number stay out.
+
+        Raises:
+            PoolError: a file is missing or damaged.
+        """
+        return self.identity or self.content_id()
+
+    def content_id(self) -> str:
+        """Return the hash of the logs and pictures.
 
         Raises:
             PoolError: a file is missing or damaged.
@@ -77,6 +90,17 @@ class Recording:
             raise PoolError(f"'{self.name}' has no camera '{camera}'; it has {known}.")
         return self.clips[camera]
 
+    def log(self, name: str) -> np.ndarray:
+        """Return a log of numbers, (n, D) float32.
+
+        Raises:
+            PoolError: there is no such log, or it is damaged.
+        """
+        if name not in self.logs:
+            known = ", ".join(self.logs) or "none"
+            raise PoolError(f"'{self.name}' has no log '{name}'; it has {known}.")
+        return self.logs[name].read()
+
 
 @dataclass(frozen=True)
 class RecordedSource:
@@ -97,6 +121,16 @@ class RecordedSource:
     notes: tuple[str, ...] = ()
     """Sentences on what is unusual but harms no demonstration."""
 
+    @property
+    def logs(self) -> dict[str, tuple[str, ...]]:
+        """Names of the dimensions of each log that all demonstrations have."""
+        first, *others = self.episodes
+        return {
+            name: log.names
+            for name, log in first.logs.items()
+            if all(name in o.logs and len(o.logs[name].names) == len(log.names) for o in others)
+        }
+
     def problems(self) -> list[str]:
         """Return nothing: opening has found what shows without decoding a picture."""
         return []
@@ -110,7 +144,7 @@ class RecordedSource:
         digest = hashlib.sha256(repr((self.fps, self.subtasks)).encode())
         for episode in self.episodes:
             pictures = [(camera, clip.digest()) for camera, clip in sorted(episode.clips.items())]
-            digest.update(repr((episode.demo_id, pictures, episode.labels)).encode())
+            digest.update(repr((episode.content_id(), pictures, episode.labels)).encode())
         return digest.hexdigest()
 
     def entries(self, indexes: Sequence[int]) -> list[str]:

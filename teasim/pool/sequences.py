@@ -83,6 +83,14 @@ class LabelledSequence:
         """
         raise PoolError(f"'{self.folder.root}' has no pictures, so it has no camera '{camera}'.")
 
+    def log(self, name: str) -> np.ndarray:
+        """Refuse: there are no logs.
+
+        Raises:
+            PoolError: always.
+        """
+        raise PoolError(f"'{self.folder.root}' has no logs of numbers, so it has no '{name}'.")
+
 
 @dataclass(frozen=True)
 class SequencePool:
@@ -119,6 +127,11 @@ class SequencePool:
         folder = MSTCNFolder.open(path, background)
         episodes = [LabelledSequence(folder, name, k) for k, name in enumerate(folder.videos)]
         return cls(folder.root, folder.names, tuple(episodes), fps)
+
+    @property
+    def logs(self) -> dict[str, tuple[str, ...]]:
+        """None: there are no logs of numbers."""
+        return {}
 
     def problems(self) -> list[str]:
         """Return a sentence for each label file that is damaged."""

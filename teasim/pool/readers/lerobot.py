@@ -23,4 +23,4 @@ def open_pool(path: Path, options: ReadOptions) -> Pool:
     return Pool.open(path)
 
 
-READER = Reader("LeRobot data set", recognises, open_pool, (), copy_of, check_pool)
+READER = Reader("LeRobot data set", recognises, open_pool, check_pool, options=(), find=copy_of)

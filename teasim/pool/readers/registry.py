@@ -61,7 +61,7 @@ def check_source(path: Path | str, options: ReadOptions | None = None) -> list[s
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it.
     """
-    place = located(path)
+    place = found_by_reader(path)
     reader = reader_of(place)
     if reader.check is not None:
         return reader.check(place)
@@ -77,7 +77,7 @@ def reader_of(path: Path) -> Reader:
     Raises:
         PoolError: there is nothing at `path`, or no reader recognises it.
     """
-    path = located(path)
+    path = found_by_reader(path)
     if not path.exists():
         raise PoolError(missing(path))
     for reader in READERS:
