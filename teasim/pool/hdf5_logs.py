@@ -58,7 +58,7 @@ class StoredLog:
 
 def stored_log(path: Path, data: Any, length: int, name: str) -> StoredLog | None:
     """Return an array as the log `name`; None if it is no log of `length` frames."""
-    shape = data.shape or ()
+    shape: tuple[int, ...] = data.shape or ()
     if data.dtype.kind not in "fiub" or len(shape) not in (1, 2) or is_pictures(data):
         return None
     width = int(shape[1]) if len(shape) == 2 else 1

@@ -149,17 +149,6 @@ class SequencePool:
         """What was decided where the files leave a doubt, one sentence each."""
         return self.episodes[0].folder.notes()
 
-    def problems(self) -> list[str]:
-        """Return a sentence for each label file that is damaged."""
-        found = []
-        for episode in self.episodes:
-            try:
-                episode.spans()
-                found += [] if episode.length else [f"The video '{episode.name}' has no frame."]
-            except PoolError as error:
-                found.append(str(error))
-        return found
-
     def content_hash(self) -> str:
         """Return a SHA-256 over the names and labels of all videos."""
         digest = hashlib.sha256("\n".join(self.subtasks).encode())

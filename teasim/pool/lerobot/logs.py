@@ -25,4 +25,4 @@ def dimension_names(name: str, feature: Mapping[str, Any]) -> tuple[str, ...]:
     if isinstance(told, list) and len(told) == width:
         return tuple(map(str, told))
     short = name.rpartition(".")[2]
-    return tuple(f"{short}_{place}" for place in range(width))
+    return (short,) if width == 1 else tuple(f"{short}_{place}" for place in range(width))

@@ -17,8 +17,8 @@ from teasim.common.files import sha256_of
 from teasim.pool.clips import probe
 from teasim.pool.lerobot.columns import as_numpy, read_columns
 from teasim.pool.lerobot.episode import Episode
-from teasim.pool.lerobot.logs import NOT_NUMBERS
 from teasim.pool.lerobot.log import TIME_TOLERANCE
+from teasim.pool.lerobot.logs import NOT_NUMBERS
 from teasim.pool.lerobot.metadata import Metadata, metadata_notes
 from teasim.pool.lerobot.places import inside
 

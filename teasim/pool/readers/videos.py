@@ -14,6 +14,8 @@ from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip, VideoInfo, probe
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.recordings import RecordedSource, Recording, unreadable
+from teasim.pool.types import Span
+from teasim.pool.video_labels import LABELS, DemoRow, is_table, read_demonstrations, read_labels
 
 SUFFIXES = frozenset(
     [
@@ -59,12 +61,26 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
     infos = {file: probe(file) for files in cameras.values() for file in files.values()}
     fps = _usual_rate([info.fps for info in infos.values()])
     episodes, notes = [], []
+    known, labels = read_demonstrations(path), read_labels(path)
     for index, name in enumerate(names):
         files = {camera: cameras[camera][name] for camera in cameras}
         clips = _clips({camera: (file, infos[file]) for camera, file in files.items()}, fps)
         entry = next(iter(files.values())).name if len(cameras) == 1 else name
         length = next(iter(clips.values())).length
-        episodes.append(Recording(index, name, length, clips, entry))
+        told = known.get(name, DemoRow(name, "", ""))
+        spans = _spans(path, name, labels.get(name, ()), length)
+        episodes.append(
+            Recording(
+                index,
+                name,
+                length,
+                clips,
+                entry,
+                labels=spans,
+                task=told.task,
+                identity=told.demo_id,
+            )
+        )
         uneven = {infos[file].n_frames for file in files.values()}
         if len(uneven) > 1 and all(_same(infos[file].fps, fps) for file in files.values()):
             notes.append(
@@ -77,8 +93,25 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
         tuple(cameras),
         tuple(episodes),
         _usage,
+        tuple(dict.fromkeys(span.subtask for demo in episodes for span in demo.labels)),
         notes=(*_notes(path, cameras, infos, fps), *notes),
     )
+
+
+def _spans(root: Path, name: str, spans: Sequence[Span], length: int) -> tuple[Span, ...]:
+    """Return the labelled sub-tasks of a video.
+
+    Raises:
+        PoolError: they overlap, or end after the video.
+    """
+    ends = [0, *(span.stop for span in spans)]
+    late = any(span.start < before for before, span in zip(ends, spans, strict=False))
+    if late or ends[-1] > length:
+        raise PoolError(
+            f"The sub-tasks of '{name}' in '{root / LABELS}' overlap or end after its {length} "
+            "frames."
+        )
+    return tuple(spans)
 
 
 def natural(name: str) -> tuple[object, ...]:
@@ -101,7 +134,7 @@ def _cameras(root: Path) -> dict[str, dict[str, Path]]:
     if flat:
         return {CAMERA: flat}
     shown = max(len(files) for files in nested.values())
-    if len(nested) > shown:
+    if len(nested) > shown and not read_demonstrations(root):
         raise PoolError(
             f"'{root}' has {len(nested)} folders of at most {shown} videos; sort them into one "
             "folder per camera, CAMERA/DEMONSTRATION.mp4."
@@ -183,7 +216,7 @@ def _notes(
         str(file.relative_to(root))
         for place in places
         for file in place.iterdir()
-        if file.is_file() and file.name[0] != "." and not is_video(file)
+        if file.is_file() and file.name[0] != "." and not is_video(file) and not is_table(file)
     )
     if ignored:
         notes.append(f"Files of '{root}' that are no videos are left out: {_listed(ignored)}.")
