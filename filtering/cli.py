@@ -172,6 +172,7 @@ def run(arguments: FilterArguments) -> int:
     from teasim.common import parallel
     from teasim.pool.readers.reader import ReadOptions
     from teasim.pool.readers.registry import open_source
+    from teasim.pool.soundness import print_notes
 
     if not 0.0 <= arguments.max_flagged <= 1.0:
         raise ConfigError(f"--max-flagged is {arguments.max_flagged}; choose a share from 0 to 1.")
@@ -192,6 +193,7 @@ def run(arguments: FilterArguments) -> int:
     )
     options = ReadOptions(arguments.fps, arguments.mask, arguments.background_label)
     pool = open_source(arguments.source, options)
+    print_notes(pool)
     check_output(arguments.out, pool.root, overwrite=arguments.overwrite)
     jobs = arguments.jobs or parallel.default_jobs()
     fitted = DemoFilter(config).fit(pool, jobs=jobs)

@@ -1,7 +1,8 @@
-"""Measure what pictures, demonstrations and environment steps cost, in processor time.
+"""Measure the processor time of images, demonstrations and environment steps.
 
-Generation, decoding and environment steps are compared with a floor measured in the same run, by
-turns: the same physics steps, pictures, encoded and decoded frames in bare loops.
+Generation, decoding and environment steps are compared with a baseline measured alternately in the
+same run: the same physics steps, images, encoded and decoded frames in bare loops, without the code
+of this project.
 """
 
 import argparse
@@ -30,8 +31,8 @@ from teasim.constants import (
     STEPS_PER_UPDATE,
     UPDATES_PER_CONTROL,
 )
-from teasim.generate import GenerateConfig, demo_rng, plan_pool
-from teasim.generate.recording import generate_demo
+from teasim.generation import GenerateConfig, demo_rng, plan_pool
+from teasim.generation.recording import generate_demo
 from teasim.pool.clips import VideoClip, VideoWriter
 from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
@@ -45,10 +46,10 @@ DECODED_FRAMES = 300
 
 @dataclass
 class Recording:
-    """The motor commands of a simulation, to be played again without anything around it."""
+    """The motor commands of a simulation, to be replayed by a bare loop."""
 
     simulation: Simulation
-    """Whose model and data to play it with."""
+    """The simulation whose model and data are used for the replay."""
     start: np.ndarray
     """State of the physics before the first command."""
     controls: list[np.ndarray]
@@ -56,7 +57,7 @@ class Recording:
 
     @classmethod
     def of(cls, simulation: Simulation) -> "Recording":
-        """Record from now on."""
+        """Start recording a simulation."""
         start = np.zeros(mujoco.mj_stateSize(simulation.model, STATE))
         mujoco.mj_getState(simulation.model, simulation.data, start, STATE)
         recording = cls(simulation, start, [])
@@ -64,7 +65,7 @@ class Recording:
         return recording
 
     def play(self, before_step: Callable[[], None] = lambda: None) -> None:
-        """Bare loop over the same physics steps; `before_step` is called once per frame."""
+        """Replay the same physics steps; `before_step` is called once per frame."""
         model, data = self.simulation.model, self.simulation.data
         mujoco.mj_setState(model, data, self.start, STATE)
         mujoco.mj_forward(model, data)
@@ -76,7 +77,7 @@ class Recording:
 
 
 def cost(work: Callable[[], object]) -> float:
-    """Processor seconds of this process and of the encoders it waits for."""
+    """Processor time [s] of this process and of the encoders it waits for."""
 
     def now() -> float:
         children = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -88,7 +89,7 @@ def cost(work: Callable[[], object]) -> float:
 
 
 def medians(works: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Median cost of each [s], measured by turns so that a busy machine meets all alike."""
+    """Median cost of each [s], measured alternately so that other load affects all equally."""
     costs: dict[str, list[float]] = {name: [] for name in works}
     for _ in range(repeats):
         for name, work in works.items():
@@ -96,8 +97,8 @@ def medians(works: dict[str, Callable[[], object]], repeats: int) -> dict[str, f
     return {name: float(np.median(values)) for name, values in costs.items()}
 
 
-def pictures(size: int, repeats: int) -> dict[str, float]:
-    """Milliseconds per picture, by quality and camera."""
+def images(size: int, repeats: int) -> dict[str, float]:
+    """Milliseconds per image, by quality and camera."""
     works: dict[str, Callable[[], object]] = {}
     renderers = []
     for quality in QUALITIES:
@@ -107,7 +108,7 @@ def pictures(size: int, repeats: int) -> dict[str, float]:
         renderers.append(renderer)
         for camera in ("left", "cup"):
             frames, name = renderer.frames, (camera,)
-            frames(name)  # the first one uploads the shapes
+            frames(name)  # the first call uploads the meshes
             works[f"{quality} {camera}"] = lambda frames=frames, name=name: frames(name)
     found = medians(works, 8 * repeats)
     for renderer in renderers:
@@ -116,24 +117,24 @@ def pictures(size: int, repeats: int) -> dict[str, float]:
 
 
 def generation(size: int, repeats: int) -> dict[str, float]:
-    """Cost of a Seq_1 demonstration and of its floor [s], and their ratio."""
+    """Cost of a Seq_1 demonstration and of its baseline [s], and their ratio."""
     config = GenerateConfig(seq1=1, size=size)
     (demo,) = plan_pool(config)
     simulation = Simulation()
     recorded = demonstrate(simulation, demo.plan, demo_rng(config.seed, demo.index))
-    next(recorded)  # the station has come to rest
+    next(recorded)  # until the station has come to rest
     recording = Recording.of(simulation)
     for _ in recorded:
         pass
     with tempfile.TemporaryDirectory() as folder:
         works = {
             "demonstration": lambda: generate_demo(fresh(folder), config, demo),
-            "floor": lambda: bare_demonstration(fresh(folder), config, recording),
+            "baseline": lambda: bare_demonstration(fresh(folder), config, recording),
             "physics": recording.play,
         }
         found = medians(works, repeats)
     frames = len(recording.controls) // UPDATES_PER_CONTROL
-    ratio = found["demonstration"] / found["floor"]
+    ratio = found["demonstration"] / found["baseline"]
     return found | {"frames": frames, "ratio": ratio}
 
 
@@ -143,7 +144,7 @@ def fresh(folder: str) -> Path:
 
 
 def bare_demonstration(folder: Path, config: GenerateConfig, recording: Recording) -> None:
-    """The same steps, pictures and encoded frames, and nothing else."""
+    """The same physics steps, images and encoded frames, and nothing else."""
     simulation, size = recording.simulation, config.size
     model, data = simulation.model, simulation.data
     option = mujoco.MjvOption()
@@ -198,7 +199,7 @@ def bare_decoding(path: Path) -> None:
 
 
 def environment(repeats: int) -> dict[str, float]:
-    """Steps per second of the joint environment and of its physics alone, and their ratio."""
+    """Steps per second of the joint environment and of its physics alone; ratio of their costs."""
     env = gymnasium.make("teasim:teasim/TeaMaking-v0", max_episode_steps=10**9)
     first, _ = env.reset(seed=0)
     hold = env.unwrapped.action(first["agent_pos"].astype(float))  # type: ignore[attr-defined]
@@ -207,7 +208,7 @@ def environment(repeats: int) -> dict[str, float]:
     recording = Recording.of(env.unwrapped._simulation)  # type: ignore[attr-defined]
     for action in actions:
         env.step(action)
-    recording.simulation.observers.pop()  # the environment's own one stays
+    recording.simulation.observers.pop()  # the environment keeps its own observer
 
     def steps() -> None:
         for action in actions:
@@ -217,14 +218,14 @@ def environment(repeats: int) -> dict[str, float]:
         env.reset(seed=0)
         steps()
 
-    works = {"steps": again, "reset": lambda: env.reset(seed=0), "floor": recording.play}
+    works = {"steps": again, "reset": lambda: env.reset(seed=0), "baseline": recording.play}
     found = medians(works, repeats)
     env.close()
     spent = found["steps"] - found["reset"]
     return {
         "steps per second": ENVIRONMENT_STEPS / spent,
-        "floor per second": ENVIRONMENT_STEPS / found["floor"],
-        "ratio": spent / found["floor"],
+        "baseline per second": ENVIRONMENT_STEPS / found["baseline"],
+        "ratio": spent / found["baseline"],
     }
 
 
@@ -237,14 +238,18 @@ def show(results: dict[str, dict[str, float]]) -> None:
 
 
 def main() -> None:
-    """Measure and report."""
+    """Measure everything and print the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--size", type=int, default=224, help="side of the pictures [pixels]")
-    parser.add_argument("--repeats", type=int, default=5, help="how often everything is measured")
-    parser.add_argument("--json", type=Path, help="file to write the numbers to")
+    parser.add_argument(
+        "--size", type=int, default=224, help="width and height of the images [pixels]"
+    )
+    parser.add_argument(
+        "--repeats", type=int, default=5, help="measurements of each kind; the median is reported"
+    )
+    parser.add_argument("--json", type=Path, help="file for the results as JSON")
     given = parser.parse_args()
     results = {
-        "pictures [ms]": pictures(given.size, given.repeats),
+        "images [ms]": images(given.size, given.repeats),
         "generation [s]": generation(given.size, given.repeats),
         "decoding [ms]": decoding(given.size, given.repeats),
         "joint environment": environment(given.repeats),

@@ -12,7 +12,7 @@ from pathlib import Path
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
 from teasim.common.parallel import default_jobs
-from teasim.generate import GenerateConfig, generate
+from teasim.generation import GenerateConfig, generate
 from teasim.pool import Pool
 
 

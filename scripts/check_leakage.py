@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from teasim.common.parallel import default_jobs
-from teasim.generate import GenerateConfig, generate
+from teasim.generation import GenerateConfig, generate
 from teasim.pool import Pool
 from teasim.pool.leakage import CLUES, leakage
 from teasim.task.mistakes import MISTAKES

@@ -13,8 +13,8 @@ import numpy as np
 
 from teasim.common.errors import SkillError
 from teasim.common.parallel import default_jobs, run
-from teasim.generate.plan import DemoPlan
-from teasim.generate.recording import mismatch
+from teasim.generation.plan import DemoPlan
+from teasim.generation.recording import mismatch
 from teasim.rollout import demonstrate
 from teasim.task.mistakes import Plan, spoil
 from teasim.task.recipes import (

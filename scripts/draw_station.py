@@ -9,8 +9,8 @@ import numpy as np
 
 from teasim.render import StationRenderer
 from teasim.rollout import run_subtask
-from teasim.skills.arm import Style
 from teasim.skills.library import perform
+from teasim.skills.style import Style
 from teasim.world.simulation import Simulation
 from teasim.world.station import nominal_layout
 

@@ -115,8 +115,8 @@ def _any_normal(direction: np.ndarray) -> np.ndarray:
     return _unit(np.cross(direction, helper))
 
 
-def vessel(outer: float, inner: float, height: float, floor: float) -> Mesh:
-    """Open vessel: outside up, over the rim, inside down to the floor."""
+def vessel(outer: float, inner: float, height: float, base: float) -> Mesh:
+    """Open vessel: outside up, over the rim, inside down to the base."""
     rim = outer - 0.0008
     return lathe(
         [
@@ -126,9 +126,9 @@ def vessel(outer: float, inner: float, height: float, floor: float) -> Mesh:
             (outer, height * 0.5),
             (rim, height),
             (inner, height),
-            (inner, floor + 0.004),
-            (inner * 0.9, floor),
-            (0.001, floor),
+            (inner, base + 0.004),
+            (inner * 0.9, base),
+            (0.001, base),
         ]
     )
 

@@ -1,7 +1,11 @@
-"""Headless OpenGL: the back end MuJoCo renders with, chosen lazily, never over the user's choice.
+"""Headless OpenGL: the back end that MuJoCo renders with, chosen when it is first needed.
 
 EGL comes first (it finds a graphics card and falls back to the processor by itself), OSMesa second
 (the processor only). Both give identical frames on a machine without a graphics card.
+
+MuJoCo takes the back end from the environment variable MUJOCO_GL at the time it is imported, and
+has no other interface for it. `choose_gl` therefore writes this variable, and no other one, in this
+process and for its children. It never replaces a value that the user has set.
 """
 
 import ctypes
@@ -63,14 +67,14 @@ print(1000 * seconds / 20)
 def choose_gl() -> str:
     """Make MuJoCo render without a display and return the back end's name; cheap to call again.
 
-    Sets the environment variable MUJOCO_GL, so that child processes inherit the choice. Call it
-    before the first `mujoco.Renderer`; it may come after `import mujoco`, which is then told.
+    Where the user has not set the environment variable MUJOCO_GL, it is set to the result. Call
+    this before the first `mujoco.Renderer`; it may come after `import mujoco`.
 
     Raises:
         RenderError: MUJOCO_GL is set to something that cannot work, or no back end's library loads.
     """
     wish = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if platform.system() != "Linux":  # elsewhere MuJoCo's own default renders off screen
+    if platform.system() != "Linux":  # on other systems MuJoCo's default renders off screen
         return wish or "default"
     if wish and wish not in USER_CHOICES:
         raise RenderError(
@@ -83,7 +87,8 @@ def choose_gl() -> str:
     for backend in (wish,) if wish else BACKENDS:
         problem = find_problem(backend)
         if problem is None:
-            _tell_mujoco(backend)
+            if not wish:
+                _set_backend(backend)
             return backend
         problems.append(f"{backend}: {problem}")
     raise RenderError(
@@ -93,7 +98,7 @@ def choose_gl() -> str:
 
 
 def find_problem(backend: str) -> str | None:
-    """Say what keeps `backend` (one of `BACKENDS`) from working, or None; without MuJoCo."""
+    """Return why `backend` (one of `BACKENDS`) cannot work, or None; MuJoCo is not imported."""
     for name in LIBRARIES[backend]:
         if _load(name) is None:
             return f"{name} is missing"
@@ -102,11 +107,10 @@ def find_problem(backend: str) -> str | None:
     return None
 
 
-def _tell_mujoco(backend: str) -> None:
-    if os.environ.get("MUJOCO_GL", "").strip().lower() == backend:
-        return
+def _set_backend(backend: str) -> None:
+    """Set MUJOCO_GL, the only variable this module writes, and make MuJoCo read it."""
     os.environ["MUJOCO_GL"] = backend
-    # MuJoCo reads the variable when it is imported, so an earlier import has to look again.
+    # MuJoCo reads the variable when it is imported; if that has happened, it has to be repeated.
     for name in ("mujoco.rendering.classic.gl_context", "mujoco.gl_context"):
         if name in sys.modules:
             importlib.reload(sys.modules[name])
@@ -120,7 +124,7 @@ def _load(name: str) -> ctypes.CDLL | None:
 
 
 def _egl_device_starts() -> bool:
-    """Whether EGL can initialise one of its devices: the library without a driver cannot."""
+    """Whether EGL can initialise a device; without a driver the library alone cannot."""
     egl = ctypes.CDLL("libEGL.so.1")
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     pointer, integer = ctypes.c_void_p, ctypes.c_int
@@ -143,20 +147,20 @@ def _egl_device_starts() -> bool:
 
 @dataclass(frozen=True)
 class Probe:
-    """What came of rendering a small scene with one back end in a process of its own."""
+    """Result of rendering a small scene with one back end in a process of its own."""
 
     backend: str
     """Name as in MUJOCO_GL."""
     ok: bool
-    """Whether a picture came out that is not blank."""
+    """Whether the picture was rendered and is not blank."""
     ms_per_frame: float | None
-    """Wall milliseconds per 224x224 frame, or None where nothing was rendered."""
+    """Duration of a 224x224 frame [ms], or None if nothing was rendered."""
     problem: str | None
-    """What went wrong in a few words, or None."""
+    """What went wrong, or None."""
 
 
 def probe(backend: str) -> Probe:
-    """Render a small scene with `backend` in a child process, whatever this process has chosen."""
+    """Render a small scene with `backend` in a child process, independent of this one's choice."""
     environment = {k: v for k, v in os.environ.items() if k != "PYOPENGL_PLATFORM"}
     environment["MUJOCO_GL"] = backend
     try:
@@ -171,14 +175,14 @@ def probe(backend: str) -> Probe:
         return Probe(backend, False, None, f"no picture within {_PROBE_SECONDS:.0f} s")
     if child.returncode == 0:
         return Probe(backend, True, round(float(child.stdout), 2), None)
-    # The libraries' own message is obscure when one is missing, so the plain reason goes first.
+    # The libraries' own message for a missing library is obscure; the plain reason is better.
     last = (child.stderr.strip().splitlines() or [f"exit code {child.returncode}"])[-1]
     reason = find_problem(backend) if backend in BACKENDS else None
     return Probe(backend, False, None, reason or last)
 
 
 def first_working() -> Probe:
-    """Probe the user's choice (MUJOCO_GL) or else each back end in turn, up to one that works.
+    """Probe the user's choice (MUJOCO_GL), or else each back end until one works.
 
     Raises:
         RenderError: none of them renders.

@@ -1,4 +1,4 @@
-"""Pictures of the station, rendered off screen; OpenGL is started lazily, once per process."""
+"""Pictures of the station, rendered off screen; the first picture starts OpenGL."""
 
 import os
 from collections.abc import Sequence
@@ -8,12 +8,13 @@ from typing import Any, Self
 import mujoco
 import numpy as np
 
-from teasim.common.errors import ConfigError, RenderError
-from teasim.constants import CAMERAS, QUALITIES
+from teasim.common.errors import RenderError
 from teasim.gl import choose_gl
+from teasim.world.borrowing import Borrowed
 from teasim.world.dressing import apply_look
 from teasim.world.liquids import VESSELS, Stream
 from teasim.world.looks import Look
+from teasim.world.pictures import check_picture
 from teasim.world.segments import SEGMENT_NAMES, segments
 from teasim.world.simulation import Simulation
 
@@ -22,15 +23,13 @@ STREAM_RADIUS = 0.003
 SHADOW_MAP = 2048
 """Side of the shadow map in `nice` quality [pixels]; 4096 takes three times as long."""
 SHADOWED = 1.45
-"""Shadows reach this far from where the lamp points, in extents of the model."""
+"""Range of the shadows around the point the lamp is aimed at, in extents of the model."""
 SMOOTHING = 2
-"""Pictures of `nice` quality are drawn this many times as large and averaged."""
+"""Pictures of `nice` quality are rendered at this multiple of the size and averaged."""
 FAR = 30.0
-"""How far one sees in `nice` quality, in extents of the model."""
-LARGEST_SIDE = 4096
-"""Largest width and height of a picture [pixels]."""
-_TEXTURED = {"floor": "floor", "table": "table_grain"}
-_PLAIN = {"floor": "floor_plain", "table": "table"}
+"""Distance of the far clipping plane in `nice` quality, in extents of the model."""
+_TEXTURED = {"ground": "ground", "table": "table_grain"}
+_PLAIN = {"ground": "ground_plain", "table": "table"}
 _SHOWN_GROUPS = (0, 1, 2)
 _GEOM, _DECORATION = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _STREAM = SEGMENT_NAMES.index("stream")
@@ -41,7 +40,8 @@ class StationRenderer:
     """Renders one simulation from named cameras.
 
     `fast` has no shadows and no smoothing; `nice` has both. Use it as a context manager: an
-    OpenGL context has to be closed before Python ends.
+    OpenGL context has to be closed before Python ends. While it is open, it changes the appearance
+    of the simulation's model, and nothing that physics depends on; `close` restores all of it.
     """
 
     def __init__(
@@ -53,24 +53,25 @@ class StationRenderer:
         quality: str = "fast",
         look: Look | None = None,
     ) -> None:
-        """Start OpenGL; with a `look`, dress the station in it.
+        """Start OpenGL, and apply `look` if there is one.
 
         Raises:
             ConfigError: unknown quality, or a side out of range.
             RenderError: no headless back end works, or none can after a fork.
         """
-        check_look(width, height, quality)
+        check_picture(width, height, quality)
         check_not_forked()
         choose_gl()
         self._simulation = simulation
         self._model = simulation.model
+        self._borrowed = Borrowed(self._model)
         if look is not None:
             self.wear(look)
         self._quality, self._size = quality, (height, width)
-        self._far = self._model.vis.map.zfar
         self._set_quality()
         self._renderer = self._start(SMOOTHING if quality == "nice" else 1)
         self._meter: mujoco.Renderer | None = None
+        self._closed = False
         self._segments = segments(self._model)
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = [group in _SHOWN_GROUPS for group in range(6)]
@@ -90,28 +91,31 @@ class StationRenderer:
         self.close()
 
     def close(self) -> None:
-        """Close the OpenGL context; safe to call twice."""
-        self._model.vis.map.zfar = self._far  # the next renderer may be of the other quality
+        """Close the OpenGL context and restore the model; safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
+        self._borrowed.give_back()
         self._renderer.close()
         if self._meter is not None:
             self._meter.close()
 
     def wear(self, look: Look) -> None:
-        """Dress the station in another look."""
+        """Apply another look to the station."""
         apply_look(self._model, look, self._simulation.data)
 
     def frames(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
-        """One (height, width, 3) uint8 RGB picture per camera of the present state."""
+        """Return one (height, width, 3) uint8 RGB picture per camera of the present state."""
         self._simulation.paint()
         return {camera: self._frame(camera) for camera in cameras}
 
     def picture(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
-        """One (height, width, 3) uint8 RGB picture from a named camera or from anywhere."""
+        """Return one (height, width, 3) uint8 RGB picture from a named or a free camera."""
         self._simulation.paint()
         return self._frame(camera)
 
     def masks(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
-        """What is seen in every pixel, per camera: (height, width) int32 of `SEGMENT_NAMES`."""
+        """Return what every pixel shows, per camera: (height, width) int32 of `SEGMENT_NAMES`."""
         self._simulation.paint()
         meter = self._measuring()
         meter.enable_segmentation_rendering()
@@ -121,9 +125,9 @@ class StationRenderer:
             meter.disable_segmentation_rendering()
 
     def depths(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
-        """How far it is along the camera's axis, per camera: (height, width) float32 [m].
+        """Return the distance along the camera's axis, per camera: (height, width) float32 [m].
 
-        Where there is nothing but sky, it is the distance of the far clipping plane.
+        Pixels of the sky have the distance of the far clipping plane.
         """
         self._simulation.paint()
         meter = self._measuring()
@@ -156,7 +160,7 @@ class StationRenderer:
         return np.asarray(renderer.render())
 
     def _measuring(self) -> mujoco.Renderer:
-        """Renderer without smoothing, which would mix the numbers of neighbours at an edge."""
+        """Return a renderer without smoothing, which would mix the numbers at an edge."""
         if self._quality == "fast":
             return self._renderer
         if self._meter is None:
@@ -165,14 +169,14 @@ class StationRenderer:
 
     def _start(self, scale: int) -> mujoco.Renderer:
         height, width = (scale * side for side in self._size)
-        buffer = self._model.vis.global_  # a larger one would have to be cleared every time
+        buffer = self._model.vis.global_  # no larger than needed: it is cleared for every picture
         buffer.offwidth, buffer.offheight = width, height
         try:
             most = self._model.ngeom + len(VESSELS)  # every vessel may pour
             renderer = mujoco.Renderer(self._model, height, width, max_geom=most)
         except Exception as error:  # every back end fails in its own way
             raise RenderError(
-                f"Rendering could not be started ({error}); run 'teasim doctor' for the cure."
+                f"Rendering could not be started ({error}); run 'teasim doctor' to find out why."
             ) from error
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = scale > 1
         return renderer
@@ -186,14 +190,14 @@ class StationRenderer:
         model.light_active[model.light("fill").id] = nice
         if nice:
             model.vis.map.zfar, model.vis.map.shadowclip = FAR, SHADOWED
-        # The texture of the floor alone is a quarter of the cost of a frame.
+        # The texture of the ground alone is a quarter of the cost of a picture.
         surfaces = _TEXTURED if nice else _PLAIN
         for geom, material in surfaces.items():
             model.geom(geom).matid = model.mat(material).id
 
 
 def check_not_forked() -> None:
-    """Refuse what would hang: OpenGL's threads do not survive a fork.
+    """Refuse to render after a fork: OpenGL's threads do not survive it and rendering would hang.
 
     Raises:
         RenderError: a process that this one was forked from has rendered.
@@ -204,33 +208,6 @@ def check_not_forked() -> None:
             "start it with multiprocessing's 'spawn' (vector_kwargs={'context': 'spawn'})."
         )
     _processes.add(os.getpid())
-
-
-def check_cameras(cameras: Sequence[str]) -> tuple[str, ...]:
-    """Return `cameras` as a tuple.
-
-    Raises:
-        ConfigError: none is given, one is unknown, or one is given twice.
-    """
-    for camera in cameras:
-        if camera not in CAMERAS:
-            raise ConfigError(f"Unknown camera '{camera}'; choose {', '.join(CAMERAS)}.")
-    if not cameras or len(set(cameras)) != len(cameras):
-        raise ConfigError(f"Name each camera once, at least one of {', '.join(CAMERAS)}.")
-    return tuple(cameras)
-
-
-def check_look(width: int, height: int, quality: str) -> None:
-    """Check what a renderer is asked for without starting OpenGL.
-
-    Raises:
-        ConfigError: unknown quality, or a side out of range.
-    """
-    if quality not in QUALITIES:
-        raise ConfigError(f"Unknown quality '{quality}'; choose {', '.join(QUALITIES)}.")
-    for name, side in (("width", width), ("height", height)):
-        if not 1 <= side <= LARGEST_SIDE:
-            raise ConfigError(f"The {name} is {side} pixels; choose from 1 to {LARGEST_SIDE}.")
 
 
 def _draw_stream(scene: Any, stream: Stream) -> None:

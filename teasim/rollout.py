@@ -1,4 +1,4 @@
-"""One demonstration carried out in physics, frame by frame, and carried out again from its log."""
+"""Demonstrations carried out in physics, frame by frame, from a plan or from a log."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -7,29 +7,29 @@ import numpy as np
 
 from teasim.common.errors import ConfigError, SkillError
 from teasim.constants import CONTROL_TIMESTEP
-from teasim.skills.arm import Style
 from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform
 from teasim.skills.pace import Pace, idle
+from teasim.skills.style import Style
 from teasim.task.mistakes import Plan
 from teasim.world.simulation import Simulation
 from teasim.world.station import draw_layout
 
 FINAL_REST = 0.5
-"""The station is shown at least this long after the last sub-task [s]."""
+"""Shortest rest after the last sub-task [s]."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One control step of a demonstration, as seen before it is carried out."""
+    """One control step of a demonstration, before it is carried out."""
 
     subtask: str
     """The sub-task being worked on."""
     position: int
     """Index of that sub-task in the demonstration."""
     target: np.ndarray
-    """Where to go, float32 as it is logged: joint angles [rad] and openings [m] (16,) for YuMi,
-    (14,) for a person."""
+    """Target, float32 as it is logged: joint angles [rad] and openings [m] (16,) for YuMi, (14,)
+    for a person."""
 
 
 def demonstrate(
@@ -43,15 +43,14 @@ def demonstrate(
 ) -> Iterator[Step]:
     """Reset the station to a random layout and let `participant` carry out `plan` step by step.
 
-    Without `randomize` everything begins in its nominal place.
-    With `match_length` it rests in between so that it lasts as long as any other demonstration.
-    The simulation stands before each yielded step, so a caller can look at it, and is advanced
-    when the next one is asked for. It goes to the float32 targets that a log holds, so `replay`
-    gives the same bits.
+    Without `randomize` everything starts in its nominal place. With `match_length` rests give the
+    demonstration a length independent of its plan. Each step is yielded before the simulation is
+    advanced, which happens when the next step is requested. The targets have the float32 precision
+    of a log, so `replay` gives the same bits.
 
     Raises:
-        ConfigError: the simulation has not the participant's body.
-        SkillError: a sub-task cannot be done from the state the ones before it left.
+        ConfigError: the simulation has another embodiment than the participant.
+        SkillError: a sub-task cannot be carried out from the present state.
     """
     _take_place(simulation, participant)
     simulation.reset(draw_layout(rng, randomize=randomize))
@@ -66,7 +65,7 @@ def demonstrate(
             yield from _advance(simulation, subtask, position, target)
     rest = pace.length - float(simulation.data.time) if pace else FINAL_REST
     if rest < FINAL_REST - CONTROL_TIMESTEP:
-        raise SkillError(f"The demonstration took {FINAL_REST - rest:.1f} s longer than it may.")
+        raise SkillError(f"The demonstration exceeds its length by {FINAL_REST - rest:.1f} s.")
     last = len(plan.steps) - 1
     yield from _rest(simulation, plan.steps[last], last, rest - FINAL_REST, rng)
     for _ in range(round(FINAL_REST / CONTROL_TIMESTEP)):
@@ -109,16 +108,15 @@ def replay(
     *,
     randomize: bool = True,
 ) -> Iterator[np.ndarray]:
-    """Carry a demonstration out again from its log.
+    """Carry out a demonstration again from its log.
 
-    The simulation stands before each yielded target, as in `demonstrate`, and after the last one
-    when the iterator is exhausted.
+    Each target is yielded before the simulation is advanced, as in `demonstrate`.
 
     Args:
-        simulation: the station; it is reset to the layout that `rng` draws.
-        targets: the log, the column `action` of a pool: angles [rad] and openings [m] (16,) each.
-        rng: a generator as `demonstrate` was given it; `teasim.generate.demo_rng` for a pool's.
-        randomize: as `demonstrate` was told.
+        simulation: The station; it is reset to the layout that `rng` draws.
+        targets: The log, column `action` of a pool: angles [rad] and openings [m] (16,) each.
+        rng: The generator of the demonstration, `teasim.generation.demo_rng` for a pool.
+        randomize: As in `demonstrate`.
     """
     simulation.reset(draw_layout(rng, randomize=randomize))
     for target in targets:
@@ -127,10 +125,10 @@ def replay(
 
 
 def run_subtask(simulation: Simulation, subtask: str, style: Style) -> int:
-    """Carry out one sub-task at once and return the number of control steps it took.
+    """Carry out one sub-task and return the number of control steps it took.
 
     Raises:
-        SkillError: it cannot be done from the present state.
+        SkillError: it cannot be carried out from the present state.
     """
     steps = 0
     for target in perform(subtask, simulation, style):

@@ -17,6 +17,6 @@ def test_a_killed_worker_is_named_and_the_cure_as_well():
     with pytest.raises(WorkerError) as error:
         run(die, [9, 9, 9], jobs=2, description="demonstrations", progress=False)
     assert str(error.value) == (
-        "A worker process was killed after 0 of 3 demonstrations, most often for want of memory; "
+        "A worker process was killed after 0 of 3 demonstrations, usually because memory ran out; "
         "run the same command again with fewer --jobs."
     )

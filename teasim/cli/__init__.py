@@ -1,1 +1,1 @@
-"""The command `teasim`: a dispatcher and the verbs of the ground floor."""
+"""The command `teasim`: a dispatcher, and the verbs of this package."""

@@ -1,4 +1,4 @@
-"""The verb `doctor`: can this machine render and make videos, how fast, and what would mend it."""
+"""The verb `doctor`: whether this machine renders and makes videos, how fast, and what to fix."""
 
 import json
 import os
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import tyro
 
+from teasim.common.cli import parse
 from teasim.common.parallel import default_jobs
 from teasim.gl import BACKENDS, FIXES, Probe, probe
 from teasim.pool.clips import VideoClip, VideoWriter, probe_codecs
@@ -31,15 +32,19 @@ PACKAGES = (
     "mink",
 )
 
-_SIDE = 224  # pixels
+"""Packages whose versions decide whether a result can be repeated."""
+
+EXAMPLES = ("teasim doctor", "teasim doctor --json > machine.json")
+
+_SIDE = 224  # pixels, as in a pool
 _FRAMES = 50
 _FPS = 10
 _LARGEST_MEAN_ERROR = 8.0  # grey levels of 255; crf 20 stays far below on a smooth picture
 
 
 @dataclass(frozen=True)
-class Doctor:
-    """Options of the verb."""
+class DoctorSettings:
+    """Check that this machine renders and makes videos; print how to fix it."""
 
     json: tyro.conf.FlagCreatePairsOff[bool] = False
     """Print one JSON object instead of text."""
@@ -47,10 +52,10 @@ class Doctor:
 
 @dataclass(frozen=True)
 class VideoProbe:
-    """What came of writing a short h264 video and reading it back."""
+    """Result of writing a short h264 video and reading it back."""
 
     ok: bool
-    """Whether all frames came back, looking the same."""
+    """Whether all frames were read back and look the same."""
     ms_per_frame: float | None
     """Wall milliseconds per 224x224 frame, encoding and decoding, or None on failure."""
     problem: str | None
@@ -59,7 +64,7 @@ class VideoProbe:
 
 @dataclass(frozen=True)
 class Report:
-    """All that the doctor found out."""
+    """All findings about this machine."""
 
     ok: bool
     """Whether rendering and video both work."""
@@ -70,24 +75,24 @@ class Report:
     cpus: int
     """Cores this process may use."""
     gl: str | None
-    """The back end that would be used, or None where none renders."""
+    """The back end that is used, or None where none renders."""
     rendering: tuple[Probe, ...]
     """One entry per back end."""
     video: VideoProbe
-    """h264 there and back, as pools are written."""
+    """Result of the check of h264 videos."""
     codecs: dict[str, str | None]
     """Per codec what keeps its videos from being read; None where all is well."""
     packages: dict[str, str | None]
-    """Version of each package that matters for repeating a result; None where it is missing."""
+    """Version of each package in `PACKAGES`; None where it is missing."""
     fixes: tuple[str, ...]
-    """Commands that mend what is missing; empty when `ok`."""
+    """Commands that install what is missing; empty when `ok`."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Check that this machine can render and make videos, and print what would mend it."""
-    options = tyro.cli(Doctor, args=arguments, prog="teasim doctor", description=main.__doc__)
+    """Check that this machine renders and makes videos; print how to fix it."""
+    settings = parse(DoctorSettings, arguments, verb="doctor", examples=EXAMPLES)
     report = examine()
-    print(json.dumps(asdict(report), indent=2) if options.json else _text(report))
+    print(json.dumps(asdict(report), indent=2) if settings.json else _text(report))
     return 0 if report.ok else 1
 
 
@@ -119,17 +124,17 @@ def probe_video() -> VideoProbe:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "probe.mp4"
         try:
-            import av  # noqa: F401  (loaded here so that the clock does not see it)
+            import av  # noqa: F401  (imported here to keep it out of the measured time)
             import imageio_ffmpeg  # noqa: F401
 
             start = time.perf_counter()
             _encode(path, frames)
             decoded = _decode(path)
-        except Exception as error:  # whatever a codec or its binary may throw is the finding
+        except Exception as error:  # any failure of a codec or its binary is the finding
             return VideoProbe(False, None, f"{type(error).__name__}: {error}")
         seconds = time.perf_counter() - start
     if decoded.shape != frames.shape:
-        return VideoProbe(False, None, f"{len(decoded)} of {len(frames)} frames came back")
+        return VideoProbe(False, None, f"{len(decoded)} of {len(frames)} frames were read back")
     change = float(np.abs(decoded.astype(np.int16) - frames).mean())
     if change > _LARGEST_MEAN_ERROR:
         return VideoProbe(False, None, f"the picture changed by {change:.0f} of 255 grey levels")
@@ -137,7 +142,7 @@ def probe_video() -> VideoProbe:
 
 
 def _gradient() -> np.ndarray:
-    """Smooth moving RGB pictures, (frames, 224, 224, 3) uint8."""
+    """Smooth moving RGB images, (frames, 224, 224, 3) uint8."""
     row, column = np.mgrid[0:_SIDE, 0:_SIDE]
     shift = 2 * np.arange(_FRAMES)[:, None, None]
     red = (row + shift) % 256 * 0.5
@@ -182,15 +187,19 @@ def _text(report: Report) -> str:
         outcome = f"{result.ms_per_frame} ms per 224x224 frame" if result.ok else result.problem
         lines.append(f"  {_mark(result.ok)}  {result.backend:<7} {outcome}{used}")
     video = report.video
-    outcome = f"{video.ms_per_frame} ms per 224x224 frame, both ways" if video.ok else video.problem
+    outcome = (
+        f"{video.ms_per_frame} ms per 224x224 frame, written and read"
+        if video.ok
+        else video.problem
+    )
     lines += ["video", f"  {_mark(video.ok)}  {'h264':<7} {outcome}", "reading"]
     for codec, problem in report.codecs.items():
         lines.append(f"  {_mark(problem is None)}  {codec:<7} {problem or 'is read exactly'}")
     lines.append("packages")
     lines += [f"  {name:<24} {found or 'missing'}" for name, found in report.packages.items()]
-    lines += ["", *(f"To mend it, run: {fix}" for fix in report.fixes)]
+    lines += ["", *(f"To fix it, run: {fix}" for fix in report.fixes)]
     if report.ok:
-        lines.append("All well: rendering and video work.")
+        lines.append("Rendering and video work.")
     return "\n".join(lines)
 
 

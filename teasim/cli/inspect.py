@@ -1,126 +1,132 @@
-"""The verb `inspect`: what a pool holds, and whether it is sound."""
+"""The verb `inspect`: what a source holds, and whether it is sound."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import tyro
 
-if TYPE_CHECKING:
-    from teasim.pool import Episode, Pool
+from teasim.common.cli import parse
 
-UNKNOWN = "-"
+if TYPE_CHECKING:
+    from teasim.pool.source import Source
+
+EXAMPLES = (
+    "teasim inspect pool",
+    "teasim inspect pool --leakage --json > pool.json",
+)
 
 
 @dataclass(frozen=True)
-class InspectConfig:
+class InspectSettings:
     """Show the demonstrations of a pool and check every file of it."""
 
-    pool: Annotated[Path, tyro.conf.Positional]
-    """Folder of a pool: any LeRobot v3.0 data set."""
-    leakage: bool = False
-    """Also tell what gives the incorrect demonstrations away: 0.5 is nothing, 0 and 1 are all."""
+    source: tyro.conf.Positional[Path]
+    """Folder or file with demonstrations, in any format that `teasim filter` reads."""
+    leakage: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Also show how well single clues, such as the duration, tell incorrect from correct
+    demonstrations (AUROC: 0.5 is chance). Needs a pool with labels of correctness."""
+    fps: float | None = None
+    """Frames per second [1/s] of a source that does not store them."""
+    repair: Path | None = None
+    """New folder for a sound copy of a LeRobot data set. Damaged demonstrations are set aside in
+    it; the source is not changed."""
+    json: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Print one JSON object instead of text."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Show the demonstrations of a pool, its hash, and any damage.
 
     Returns:
-        0 when the pool is sound, 1 when it is damaged.
+        0 when the source is sound, 1 when it is damaged.
 
     Raises:
-        PoolError: There is no pool at the path, or leakage is asked for without labels.
+        ConfigError: `--fps` is given for a source that stores its frame rate.
+        PoolError: nothing readable is at the path, or `--leakage` lacks labels.
     """
-    config = tyro.cli(InspectConfig, prog="teasim inspect", args=argv)
-    from teasim.common.errors import PoolError
-    from teasim.pool import Pool
-    from teasim.pool.integrity import check_pool
+    settings = parse(InspectSettings, argv, verb="inspect", examples=EXAMPLES)
+    if settings.repair is not None:
+        return _repair(settings, settings.repair)
+    from teasim.cli.facts import facts_of, json_of, problem_count, text_of
+    from teasim.pool.readers.registry import reader_of
 
-    problems = check_pool(config.pool)
-    try:
-        print(_description(Pool.open(config.pool)))
-    except PoolError as error:
-        problems = list(dict.fromkeys([*problems, str(error)]))
-    for problem in problems:
-        print(problem)
-    print(f"Integrity: {_verdict(len(problems))}")
-    if config.leakage and not problems:
-        print(_leakage(Pool.open(config.pool)))
+    reader = reader_of(settings.source)
+    source, problems = _open_and_check(settings)
+    clues = _leakage(source) if settings.leakage and source is not None and not problems else None
+    facts = None if source is None else facts_of(source)
+    if settings.json:
+        about = {"source": str(settings.source), "format": reader.name, "problems": problems}
+        print(json.dumps(json_of(facts, **about, leakage=clues), indent=2))
+        return 1 if problems else 0
+    if facts is not None:
+        print(text_of(str(settings.source), reader.name, facts))
+    print("\n".join([*problems, f"Integrity:      {problem_count(problems)}"]))
+    if clues is not None:
+        print(_leakage_text(clues))
     return 1 if problems else 0
 
 
-def _leakage(pool: Pool) -> str:
-    """The clues in words."""
+def _open_and_check(settings: InspectSettings) -> tuple[Source | None, list[str]]:
+    """The source, None if it cannot be opened, and one sentence per problem."""
+    from teasim.common.errors import PoolError
+    from teasim.pool.readers.reader import ReadOptions
+    from teasim.pool.readers.registry import check_source, open_source
+    from teasim.pool.soundness import print_notes
+
+    options = ReadOptions(fps=settings.fps)
+    problems = check_source(settings.source, options)
+    try:
+        source = open_source(settings.source, options)
+    except PoolError as error:
+        return None, list(dict.fromkeys([*problems, str(error)]))
+    print_notes(source)
+    return source, problems
+
+
+def _repair(settings: InspectSettings, target: Path) -> int:
+    """Write a sound copy and say what was set aside.
+
+    Raises:
+        ConfigError: `target` is in use, or the format has no repair.
+        PoolError: the source cannot be repaired.
+    """
+    from teasim.common.errors import ConfigError
+    from teasim.pool.readers import lerobot
+    from teasim.pool.readers.registry import reader_of
+    from teasim.pool.repair import SET_ASIDE, repair_pool
+
+    reader = reader_of(settings.source)
+    if reader is not lerobot.READER:
+        raise ConfigError(
+            f"'{settings.source}' is of the format {reader.name}; --repair works on a "
+            f"{lerobot.READER.name} only."
+        )
+    done = repair_pool(settings.source, target)
+    for index, reasons in done.set_aside.items():
+        print("\n".join(f"Demonstration {index}: {reason}" for reason in reasons))
+    print(f"{len(done.kept)} sound demonstrations are in {done.root}, numbered from 0.")
+    if done.set_aside:
+        print(f"{len(done.set_aside)} damaged ones were set aside in {done.root / SET_ASIDE}.")
+    return 0
+
+
+def _leakage(source: Source) -> dict[str, float]:
+    """AUROC of every clue.
+
+    Raises:
+        PoolError: the source has no labels, or is of a format that stores none.
+    """
+    from teasim.pool import Pool
     from teasim.pool.leakage import leakage
 
-    lines = [
-        "Leakage (AUROC of one clue alone, incorrect against correct; 0.5 gives nothing away):"
-    ]
-    return "\n".join(
-        [*lines, *(f"  {name:20}{value:.2f}" for name, value in leakage(pool).items())]
-    )
+    return leakage(Pool.open(source.root))
 
 
-def _description(pool: Pool) -> str:
-    """The pool in words: a table of demonstrations, then what they have in common."""
-    header = ["#", "demo_id", "s", "sequence", "correct", "mistakes", "participant", "sub-tasks"]
-    table = _aligned([header, *(_row(pool, episode) for episode in pool.episodes)])
-    seconds = sum(episode.length for episode in pool.episodes) / pool.fps
-    facts = {
-        "Pool": str(pool.root),
-        "Demonstrations": f"{len(pool.episodes)}, {seconds:.1f} s in all",
-        "Cameras": ", ".join(pool.cameras) or "none",
-        "Frames per second": f"{pool.fps:g}",
-        "Joint log": f"{len(pool.state_names)} dimensions" if pool.state_names else "none",
-        "Sub-tasks": ", ".join(pool.subtasks) or "none labelled",
-        "Content hash": _or_unknown(pool.content_hash),
-    }
-    width = max(map(len, facts)) + 1
-    lines = [f"{name + ':':{width}} {value}" for name, value in facts.items()]
-    return "\n".join([*table, "", *lines])
-
-
-def _row(pool: Pool, episode: Episode) -> list[str]:
-    from teasim.common.errors import PoolError
-
-    start = [str(episode.index), _or_unknown(lambda: episode.demo_id)]
-    seconds = f"{episode.length / pool.fps:.1f}"
-    try:
-        known = episode.record
-        spans = " ".join(span.subtask for span in episode.spans()) or UNKNOWN
-        participant = episode.participant or UNKNOWN
-    except PoolError:
-        return [*start, seconds, *[UNKNOWN] * 5]
-    if known is None:
-        return [*start, seconds, *[UNKNOWN] * 3, participant, spans]
-    mistakes = ", ".join(f"{m.name} {m.subtask}" for m in known.mistakes) or "none"
-    correct = "yes" if known.correct else "no"
-    return [*start, seconds, known.sequence, correct, mistakes, participant, spans]
-
-
-def _verdict(n_problems: int) -> str:
-    if not n_problems:
-        return "sound"
-    return "damaged, 1 problem" if n_problems == 1 else f"damaged, {n_problems} problems"
-
-
-def _or_unknown(read: Callable[[], str]) -> str:
-    """What `read` returns; unknown where damage, which is listed below, keeps it from us."""
-    from teasim.common.errors import PoolError
-
-    try:
-        return read()
-    except PoolError:
-        return UNKNOWN
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of a table with columns of one width; the last column is not padded."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
+def _leakage_text(clues: dict[str, float]) -> str:
+    head = "Leakage (AUROC of one clue alone, incorrect against correct; 0.5 is chance):"
+    return "\n".join([head, *(f"  {name:20}{value:.2f}" for name, value in clues.items())])

@@ -1,46 +1,55 @@
-"""The command `teasim`: finds the verb among the installed entry points and hands over.
+"""The command `teasim`: finds the verb among the installed entry points and calls it.
 
-Every package, ours or another's, adds a verb with one line in its own metadata:
+Any package adds a verb with one line in its own metadata:
 
     [project.entry-points."teasim.verbs"]
     myverb = "my_package.cli:my_verb"
 
 where `my_verb(arguments: list[str]) -> int` returns an exit code, and the first line of its
 docstring is the summary that `teasim --help` prints. Only the verb that is asked for is imported.
+
+A verb that continues where an interrupted run stopped is marked by `teasim.common.cli.resumable`;
+one that has more to say raises `teasim.common.errors.Interrupted` with a sentence of its own.
 """
 
 import ast
+import difflib
 import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint, entry_points, version
+from typing import Any
 
-from teasim.common.errors import TeasimError
+from teasim.common.errors import Interrupted, TeasimError
 
 GROUP = "teasim.verbs"
 
-EXIT_DONE = 0
-EXIT_BAD_INPUT = 2
-EXIT_INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug of ours, never the user's fault
+EXIT_DONE = 0  # success, as every shell understands it
+EXIT_BAD_INPUT = 2  # what argparse uses for a usage error
+EXIT_INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h: a bug in teasim, not the user's fault
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
 EXIT_BROKEN_PIPE = 141  # 128 + SIGPIPE, as a shell reports it
+
+RESUMABLE = "Interrupted; run the same command again to continue."
+NOT_RESUMABLE = "Interrupted; run the same command again to start over."
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return its exit code; `argv` defaults to the process's own arguments.
 
-    Bad input gives one sentence on stderr and code 2, a bug one sentence and code 70; `--debug`
-    anywhere on the line adds the traceback to both.
+    Bad input gives one sentence on stderr and code 2, an interrupt (Ctrl-C) one sentence and code
+    130, a bug one sentence and code 70; `--debug` anywhere on the line adds the traceback of an
+    error.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     arguments = [argument for argument in given if argument != "--debug"]
     try:
         code = _dispatch(arguments)
-        sys.stdout.flush()  # so that a closed pipe is met here and not at interpreter exit
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+        sys.stdout.flush()  # so that a closed pipe is noticed here and not at interpreter exit
+    except KeyboardInterrupt as interrupt:
+        return _complain(str(interrupt) or NOT_RESUMABLE, EXIT_INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_BROKEN_PIPE
@@ -58,12 +67,23 @@ def _dispatch(arguments: list[str]) -> int:
     if arguments[0] == "--version":
         print(f"teasim {version('teasim')}")
         return EXIT_DONE
+    if arguments[0] == "--completion":
+        print(_completion(arguments[1:]))
+        return EXIT_DONE
     if os.environ.get("NO_COLOR"):
         os.environ["TERM"] = "dumb"  # tyro does not know NO_COLOR, but it knows this
+    return _run(_find(arguments[0]).load(), arguments[1:])
+
+
+def _run(verb: Callable[[list[str]], Any], arguments: list[str]) -> int:
     try:
-        result = _find(arguments[0]).load()(arguments[1:])
+        result = verb(arguments)
     except SystemExit as leave:  # how argument parsers end after --help and after a usage error
         result = leave.code
+    except KeyboardInterrupt as interrupt:
+        resumes = getattr(verb, "resumes", False)
+        general = RESUMABLE if resumes else NOT_RESUMABLE
+        raise Interrupted(str(interrupt) or general) from None
     if isinstance(result, str):
         raise TeasimError(result)
     return EXIT_DONE if result is None else int(result)
@@ -72,7 +92,9 @@ def _dispatch(arguments: list[str]) -> int:
 def _find(name: str) -> EntryPoint:
     verbs = _verbs()
     if name not in verbs:
-        raise TeasimError(f"unknown verb '{name}'; choose {', '.join(verbs)}.")
+        close = difflib.get_close_matches(name, verbs, n=1)
+        guess = f" did you mean '{close[0]}'?" if close else ""
+        raise TeasimError(f"unknown verb '{name}';{guess} choose {', '.join(verbs)}.")
     return verbs[name]
 
 
@@ -85,12 +107,23 @@ def _overview() -> str:
     verbs = _verbs()
     width = max(map(len, verbs), default=0)
     lines = [f"  {name:<{width}}  {_summary(point)}".rstrip() for name, point in verbs.items()]
-    head = "usage: teasim VERB [options]     (teasim VERB --help tells a verb's own options)"
+    head = "usage: teasim VERB [options]     (teasim VERB --help lists a verb's options)"
     tail = [
-        "  --version  print the version",
-        "  --debug    with any verb: show the traceback of an error",
+        "  --version     print the version",
+        "  --completion  print a script that completes verbs: bash or zsh",
+        "  --debug       with any verb: show the traceback of an error",
     ]
     return "\n".join([head, "", *lines, "", *tail])
+
+
+def _completion(shells: list[str]) -> str:
+    """A script that completes the names of verbs, for the shell that is named."""
+    if shells not in (["bash"], ["zsh"]):
+        raise TeasimError("--completion takes the name of a shell: choose bash or zsh.")
+    complete = f"complete -W '{' '.join(_verbs())}' -o default teasim"
+    # zsh understands bash's `complete` after bashcompinit.
+    start = ["autoload -U compinit bashcompinit", "compinit", "bashcompinit"]
+    return "\n".join([*(start if shells == ["zsh"] else []), complete])
 
 
 def _summary(point: EntryPoint) -> str:
@@ -104,7 +137,7 @@ def _summary(point: EntryPoint) -> str:
             if isinstance(node, ast.FunctionDef) and node.name == point.attr
         ]
         return (ast.get_docstring(functions[0]) or "").partition("\n")[0]
-    except Exception:  # a broken plug-in must not take the list of verbs with it
+    except Exception:  # the list must survive a broken plug-in
         return "(this verb's module cannot be read)"
 
 

@@ -1,1 +1,1 @@
-"""What all three packages share: errors, registries, parallel maps, files, statistics."""
+"""What all three packages share: errors, registries, parallel maps, files, statistics, settings."""

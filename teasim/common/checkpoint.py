@@ -1,4 +1,4 @@
-"""Weights beside a description of them: two files, so that nothing is read that was not saved."""
+"""Weights in one file, their description and checksum in another."""
 
 import hashlib
 import json
@@ -13,23 +13,23 @@ from teasim.common.files import write_bytes, write_json
 
 @dataclass(frozen=True)
 class CheckpointKind:
-    """What a folder holds: STEM.safetensors (weights) and STEM.json (what they are)."""
+    """Format of a checkpoint: STEM.safetensors (weights) and STEM.json (their description)."""
 
     stem: str
-    """Name of both files without suffix, which is also what one calls the thing."""
+    """Name of both files without suffix, also used in messages, e.g. 'policy'."""
     version: int
     """Version of the description; only this one is read."""
     held: str
-    """What a folder lacks that holds none."""
+    """Noun phrase for messages about a missing checkpoint, e.g. 'fitted segmenter'."""
     remedy: str
-    """What to do about a damaged one."""
+    """Advice for messages about a damaged checkpoint."""
 
     def weights_path(self, folder: Path) -> Path:
-        """Where the weights are."""
+        """Return the path of the weights."""
         return folder / f"{self.stem}.safetensors"
 
     def description_path(self, folder: Path) -> Path:
-        """Where the description is."""
+        """Return the path of the description."""
         return folder / f"{self.stem}.json"
 
     def save(self, folder: Path, weights: bytes, description: Mapping[str, Any]) -> None:
@@ -41,14 +41,14 @@ class CheckpointKind:
         identity = {"format": f"teasim-{self.stem}", "version": self.version}
         checksum = {"weights_sha256": hashlib.sha256(weights).hexdigest()}
         write_bytes(self.weights_path(folder), weights)
-        # Last, so that a folder with a description always holds the whole.
+        # Written last, so that a folder with a description is always complete.
         write_json(self.description_path(folder), identity | dict(description) | checksum)
 
     def describe(self, folder: Path) -> dict[str, Any]:
         """Read the description.
 
         Raises:
-            CheckpointError: it is missing, damaged, of something else, or of another version.
+            CheckpointError: it is missing, damaged, of another kind, or of another version.
         """
         path = self.description_path(folder)
         try:
@@ -69,7 +69,7 @@ class CheckpointKind:
         """Read the weights that `description` was saved with.
 
         Raises:
-            CheckpointError: they are missing, or not those.
+            CheckpointError: they are missing or differ from those that were saved.
         """
         path = self.weights_path(folder)
         weights = self._read(path)
@@ -80,7 +80,7 @@ class CheckpointKind:
         return weights
 
     def mismatch(self, folder: Path) -> CheckpointError:
-        """Return the error to raise when the weights cannot be what the description says."""
+        """Return the error for weights that contradict their description."""
         return CheckpointError(
             f"'{self.description_path(folder)}' does not describe the weights beside it; "
             f"{self.remedy}."

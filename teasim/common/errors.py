@@ -5,6 +5,10 @@ class TeasimError(Exception):
     """Base of all errors the command line turns into one sentence and exit code 2."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """The user pressed Ctrl-C; the sentence says what is kept and how to continue."""
+
+
 class ConfigError(TeasimError):
     """A setting is unknown, out of range, or contradicts another one."""
 
@@ -18,15 +22,15 @@ class RenderError(TeasimError):
 
 
 class SkillError(TeasimError):
-    """A sub-task cannot be carried out from the present state of the station."""
+    """A sub-task cannot be carried out from the current state of the station."""
 
 
 class GenerationError(TeasimError):
-    """A demonstration did not come out as its label says, however often it was made again."""
+    """No attempt at a demonstration showed what its label says."""
 
 
 class CheckpointError(TeasimError):
-    """Saved weights are missing, damaged, or made for something else than they are used for."""
+    """Saved weights are missing, damaged, or were saved for a different purpose."""
 
 
 class WorkerError(TeasimError):

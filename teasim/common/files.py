@@ -1,4 +1,4 @@
-"""Writing that is either done or not there: temporary name, fsync, rename."""
+"""Files that are written completely or not at all: temporary name, fsync, rename."""
 
 import hashlib
 import json
@@ -39,12 +39,12 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write `value` atomically as indented JSON; NaN and infinity are refused."""
+    """Write `value` atomically as indented JSON; NaN and infinity raise ValueError."""
     write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n")
 
 
 def link_or_copy(source: Path, target: Path) -> None:
-    """Give `source` a second name; copy where the file system has no hard links."""
+    """Make a hard link to `source`; copy it where the file system has none."""
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(source, target)
@@ -54,7 +54,7 @@ def link_or_copy(source: Path, target: Path) -> None:
 
 
 def check_new_folder(path: Path) -> None:
-    """Raise ConfigError unless `path` is free for output: nothing there yet, or an empty folder."""
+    """Raise ConfigError unless `path` does not exist or is an empty folder."""
     if path.is_dir() and any(path.iterdir()):
         raise ConfigError(f"The output folder '{path}' is in use; choose a new or empty one.")
     if path.exists() and not path.is_dir():

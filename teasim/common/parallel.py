@@ -1,4 +1,4 @@
-"""The one place that talks to joblib: ordered parallel maps with a progress bar."""
+"""Ordered parallel maps with a progress bar; the only module that uses joblib."""
 
 import os
 import sys
@@ -17,8 +17,8 @@ Result = TypeVar("Result")
 
 BACKENDS = ("loky", "dask", "ray")
 
-# One thread per worker: the workers are the parallelism. llvmpipe with 0 threads renders in the
-# calling thread, which is the best throughput when every core has its own process.
+# One thread per worker, because there is one worker per core. With 0 threads llvmpipe renders in
+# the calling thread, which gives the best throughput in that case.
 WORKER_ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -43,18 +43,18 @@ def run(
 ) -> list[Result]:
     """Map `function` over `items` in `jobs` processes and return the results in order.
 
-    With one job (or one item) it runs in this process, so a debugger can step in and nothing is
-    pickled. `progress` None means: a bar when stderr is a terminal.
+    With one job or one item everything runs in this process, so a debugger works and nothing is
+    pickled. With `progress` None there is a bar if stderr is a terminal.
 
     Raises:
         ConfigError: see `check_workers`, or the back end's package is not installed.
-        WorkerError: a process was killed from outside, most often for want of memory.
+        WorkerError: a process was killed from outside, usually because memory ran out.
     """
     check_workers(jobs, backend)
     show = sys.stderr.isatty() if progress is None else progress
     bar = tqdm(total=len(items), desc=description, disable=not show, file=sys.stderr, leave=False)
     with bar, warnings.catch_warnings():
-        # Workers whose memory has grown are renewed; their work goes on, so it is no concern.
+        # joblib replaces workers that have used much memory; no work is lost.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
         results = []
         try:
@@ -64,13 +64,13 @@ def run(
         except TerminatedWorkerError as error:
             raise WorkerError(
                 f"A worker process was killed after {len(results)} of {len(items)} {description}, "
-                "most often for want of memory; run the same command again with fewer --jobs."
+                "usually because memory ran out; run the same command again with fewer --jobs."
             ) from error
     return results
 
 
 def check_workers(jobs: int, backend: str) -> None:
-    """Check how `run` is to work before anything is begun.
+    """Check the arguments of `run` before any work starts.
 
     Raises:
         ConfigError: `jobs` is not positive, or `backend` is unknown.
@@ -98,7 +98,7 @@ def _results(
 
 
 def _register(backend: str) -> None:
-    """Make a joblib back end that lives in another package known to joblib."""
+    """Register a joblib back end that another package provides."""
     try:
         if backend == "dask":
             import distributed.joblib  # noqa: F401

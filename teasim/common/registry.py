@@ -1,4 +1,4 @@
-"""Things that are chosen by name."""
+"""Lookup of registered entries by name."""
 
 from collections.abc import Mapping
 from typing import TypeVar
@@ -9,10 +9,10 @@ Registered = TypeVar("Registered")
 
 
 def named(what: str, registry: Mapping[str, Registered], name: str) -> Registered:
-    """Return what a registry has under a name; `what` says of which kind it is.
+    """Return the entry called `name`; `what` names the kind of entry in messages.
 
     Raises:
-        ConfigError: it has nothing under that name.
+        ConfigError: there is no such entry.
     """
     if name not in registry:
         raise ConfigError(f"Unknown {what} '{name}'; choose {', '.join(registry)}.")

@@ -1,4 +1,4 @@
-"""Rates and differences with honest intervals, wider where trials come in correlated groups."""
+"""Rates and differences with 95 % intervals, which are wider for correlated groups of trials."""
 
 import math
 from collections.abc import Sequence
@@ -12,17 +12,21 @@ Z_95 = 1.959963984540054
 
 
 RESAMPLES = 10_000
-"""Times that pairs are drawn anew for the interval of a difference."""
+"""Bootstrap samples for the interval of a difference."""
 
 
 @dataclass(frozen=True)
 class Rate:
-    """A share of trials with its 95 % interval; no trials at all: nan within [0, 1]."""
+    """A share of trials with its 95 % interval; without trials nan within [0, 1]."""
 
     hits: int
+    """Trials that count."""
     trials: int
+    """All trials."""
     low: float
+    """Lower end of the interval, in [0, 1]."""
     high: float
+    """Upper end of the interval, in [0, 1]."""
 
     @property
     def value(self) -> float:
@@ -38,6 +42,10 @@ class Rate:
 
 def wilson_interval(hits: float, trials: float, z: float = Z_95) -> tuple[float, float]:
     """Score interval of a binomial share (Wilson 1927); (0, 1) when `trials` is 0.
+
+    >>> low, high = wilson_interval(9, 10)
+    >>> f"{low:.3f} to {high:.3f}"
+    '0.596 to 0.982'
 
     Raises:
         ValueError: unless 0 <= hits <= trials.
@@ -57,12 +65,16 @@ def wilson_interval(hits: float, trials: float, z: float = Z_95) -> tuple[float,
 
 
 def rate(hits: int, trials: int) -> Rate:
-    """Rate of independent trials."""
+    """Rate of independent trials.
+
+    >>> str(rate(12, 14))
+    '85.7 % (60.1-96.0)'
+    """
     return Rate(hits, trials, *wilson_interval(hits, trials))
 
 
 def grouped_rate(groups: Sequence[tuple[int, int]]) -> Rate:
-    """Rate of (hits, trials) per group, where trials within a group are alike.
+    """Rate of (hits, trials) per group, where trials within a group are correlated.
 
     The actions of one episode are such a group: a policy that is stuck repeats its error. Wilson's
     interval is taken at the effective number of trials, trials / max(1, design effect), where the
@@ -97,8 +109,11 @@ class Difference:
     """A difference of two shares, in [-1, 1], with its 95 % interval."""
 
     value: float
+    """Observed difference."""
     low: float
+    """Lower end of the interval."""
     high: float
+    """Upper end of the interval."""
 
     def __str__(self) -> str:
         """Write the difference in points, for example '+12.0 points (+3.1 to +20.5)'."""

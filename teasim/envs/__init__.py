@@ -1,1 +1,1 @@
-"""The world as Gymnasium environments: joint targets at 10 Hz, and whole sub-tasks."""
+"""The station as Gymnasium environments: joint targets at 10 Hz, and whole sub-tasks."""

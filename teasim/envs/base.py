@@ -1,4 +1,4 @@
-"""What both environments share: the station, how it is reset, seen and judged."""
+"""The base of both environments: the station, its reset, observations and verdict."""
 
 import copy
 from collections.abc import Mapping, Sequence
@@ -11,10 +11,11 @@ import numpy as np
 from teasim.common.errors import ConfigError
 from teasim.constants import FPS, SUBTASKS
 from teasim.envs.observations import observation_space, observe
-from teasim.render import StationRenderer, check_cameras, check_look
+from teasim.render import StationRenderer
 from teasim.task.recipes import allowed_next, next_correct
-from teasim.task.scoring import Verdict, judge
+from teasim.task.scoring import VIOLATION_KINDS, VIOLATIONS, Verdict, judge
 from teasim.world.looks import Look, check_look_kind, fixed_look, sample_look
+from teasim.world.pictures import check_cameras, check_picture
 from teasim.world.simulation import Simulation
 from teasim.world.state import SimulationState
 from teasim.world.station import draw_layout
@@ -25,27 +26,38 @@ RENDER_SIZE = (480, 640)
 
 @dataclass(frozen=True)
 class EnvState:
-    """An environment between two steps; it can be pickled."""
+    """The state of an environment between two steps; it can be pickled."""
 
     env: str
-    """Class of the environment."""
+    """Name of the environment's class."""
     simulation: SimulationState
-    """The station."""
+    """State of the station."""
     random: Mapping[str, Any]
-    """State of the generator that the next resets draw from."""
+    """State of the generator from which the next resets draw."""
     look: Look
-    """How the station looks."""
+    """Look of the station."""
     progress: Any
     """What the environment itself counts."""
 
 
 class StationEnv(gymnasium.Env[dict[str, Any], Any]):
-    """The tea-making station; subclasses say what an action is."""
+    """The tea-making station; subclasses define the actions.
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": FPS}  # noqa: RUF012 (Gymnasium's way)
+    `metadata["violations"]` has every violation by its key, in words: "unsafe" stands for
+    `info["unsafe"]`, all other keys can occur in `info["violations"]`.
+    `metadata["violation_kinds"]` has the keys that are counted together, by the words for the kind.
+    """
+
+    metadata = {  # noqa: RUF012 (as Gymnasium declares it)
+        "render_modes": ["rgb_array"],
+        "render_fps": FPS,
+        "violations": dict(VIOLATIONS),
+        "violation_kinds": dict(VIOLATION_KINDS),
+    }
 
     def __init__(
         self,
+        *,
         obs_type: str = "state",
         cameras: Sequence[str] = ("left", "cup"),
         width: int = 224,
@@ -59,20 +71,20 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
 
         Args:
             obs_type: state, pixels or pixels_agent_pos.
-            cameras: Cameras of the `pixels` observation; the first one is the one of `render()`.
+            cameras: Cameras of the `pixels` observation; `render()` uses the first one.
             width: Width of the pictures [pixels].
             height: Height of the pictures [pixels].
             render_mode: None or rgb_array.
-            quality: Look of the pictures, fast or nice.
+            quality: Quality of the pictures, fast or nice; nice renders 20 to 40 times slower.
             randomize: Move and turn the things on the table at every reset.
-            look: fixed, or random: light, colours, cameras and things around change at every reset.
+            look: fixed, or random: light, colours, cameras and distractors change at every reset.
 
         Raises:
             ConfigError: an argument is unknown or out of range.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ConfigError(f"Unknown render_mode '{render_mode}'; choose None or rgb_array.")
-        check_look(width, height, quality)
+        check_picture(width, height, quality)
         self.render_mode = render_mode
         self._cameras = check_cameras(cameras)
         self._size = (height, width)
@@ -80,8 +92,9 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         self._randomize = randomize
         self._look_kind = check_look_kind(look)
         self._look = fixed_look()
-        self.observation_space = observation_space(obs_type, self._cameras, height, width)
         self._simulation = Simulation()
+        names = self._simulation.embodiment.state_names
+        self.observation_space = observation_space(obs_type, names, self._cameras, self._size)
         self._renderer: StationRenderer | None = None
 
     def reset(
@@ -89,27 +102,27 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start a new episode: everything in place, both arms at READY.
 
-        `options={"randomize": False}` puts everything in its nominal place this once.
+        `options={"randomize": False}` puts everything in its nominal place for this episode.
         """
         super().reset(seed=seed)
         randomize = (options or {}).get("randomize", self._randomize)
         self._simulation.reset(draw_layout(self.np_random, randomize=randomize))
-        if self._look_kind == "random":  # else nothing is drawn: seeds keep their layouts
+        if self._look_kind == "random":  # otherwise nothing is drawn, and layouts stay
             self._wear(sample_look(self.np_random))
         return self._observation(), self._info(self._verdict())
 
     def render(self) -> Any:
-        """Picture (height, width, 3) uint8 of the first camera, or None without a render mode."""
+        """Return a picture (height, width, 3) uint8 of the first camera, or None."""
         if self.render_mode is None:
             return None
         return self._pictures().frames(self._cameras[:1])[self._cameras[0]]
 
     def masks(self) -> dict[str, np.ndarray]:
-        """What every pixel of every camera shows: (height, width) int32 of `SEGMENT_NAMES`."""
+        """Return what the pixels of every camera show: (height, width) int32 of `SEGMENT_NAMES`."""
         return self._pictures().masks(self._cameras)
 
     def depths(self) -> dict[str, np.ndarray]:
-        """Distance along the axis of every camera: (height, width) float32 [m]."""
+        """Return the distance along the axis of every camera: (height, width) float32 [m]."""
         return self._pictures().depths(self._cameras)
 
     def close(self) -> None:
@@ -119,9 +132,9 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
             self._renderer = None
 
     def get_state(self) -> EnvState:
-        """Everything the environment's future depends on, apart from the actions to come.
+        """Return everything that the environment's future depends on, but the actions to come.
 
-        Wrappers count for themselves: the steps of Gymnasium's `TimeLimit` are not in it.
+        The state of wrappers, such as the step count of `TimeLimit`, is not part of it.
         """
         return EnvState(
             type(self).__name__,
@@ -132,7 +145,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         )
 
     def set_state(self, state: EnvState) -> None:
-        """Go back to `state`: the same actions then give the same bits as they gave from there.
+        """Return to `state`, from which the same actions give the same bits as before.
 
         Raises:
             ConfigError: the state was taken from another environment; nothing has changed then.
@@ -145,11 +158,11 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         self._set_progress(state.progress)
 
     def _progress(self) -> Any:
-        """What a subclass counts, for `get_state`."""
+        """Return what a subclass counts, for `get_state`."""
         raise NotImplementedError
 
     def _set_progress(self, progress: Any) -> None:
-        """Go back to what `_progress` gave."""
+        """Return to what `_progress` gave."""
         raise NotImplementedError
 
     def _pictures(self) -> StationRenderer:

@@ -12,16 +12,16 @@ from teasim.envs.rewards import RewardTerms, RewardWeights
 
 
 class TeaMakingEnv(StationEnv):
-    """Drive both arms: 14 joint targets, then the openings of the right and the left gripper.
+    """Drive both arms: the joint targets, then the openings of the right and the left gripper.
 
-    Actions are in [-1, 1]; beyond it they are clipped. For the grippers -1 squeezes with full force
-    and 1 is wide open. For the joints `control` says what they mean: with `position` they span the
-    joints' ranges; with `delta` they change the last target by at most `DELTA_SHARE` of what the
-    joint's largest speed covers in a step.
+    Actions are clipped to [-1, 1]. For the grippers -1 squeezes with full force and 1 is wide open.
+    For the joints `control` sets the meaning: `position` spans the ranges of the joints; `delta`
+    changes the last target by at most `DELTA_SHARE` of what the largest joint speed covers in a
+    step.
 
-    Each sub-task that is completed for the first time earns 1/7 and the goal 1; spilling, bumping
-    and leaving the oven on cost a little. `info["reward_terms"]` has the terms of `RewardTerms`;
-    the reward is their sum weighted by `RewardWeights`.
+    Every sub-task that is completed for the first time earns 1/7 and the goal 1; spills,
+    collisions and an oven left on cost a little. `info["reward_terms"]` holds the terms of
+    `RewardTerms`; the reward is their sum weighted by `RewardWeights`.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class TeaMakingEnv(StationEnv):
 
         Args:
             control: Meaning of the joints' actions, position or delta.
-            reward_weights: Weights of terms of the reward that are not to be the default ones.
+            reward_weights: Weights of reward terms that replace the default ones.
             **kwargs: The arguments of `StationEnv`.
 
         Raises:
@@ -43,9 +43,11 @@ class TeaMakingEnv(StationEnv):
         """
         self._weights = RewardWeights.of(reward_weights)
         super().__init__(**kwargs)
-        self._control = make_control(control, self._simulation.model)
+        body = self._simulation.embodiment
+        self._names = body.state_names
+        self._control = make_control(control, body, self._simulation.model)
         self._terms = RewardTerms(self._simulation)
-        self.action_space = spaces.Box(-1.0, 1.0, (16,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (len(self._names),), np.float32)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -59,20 +61,20 @@ class TeaMakingEnv(StationEnv):
         """Advance 0.1 s towards the targets.
 
         Raises:
-            ConfigError: the action is not 16 finite numbers; nothing has moved then.
+            ConfigError: the action is not one finite number per dimension; nothing has moved then.
         """
-        self._simulation.step(self.target(check_action(action)))
+        self._simulation.step(self.target(check_action(action, self._names)))
         verdict = self._verdict()
         terms = self._terms.take(verdict)
         info = self._info(verdict) | {"reward_terms": terms}
         return self._observation(), self._weights.total(terms), verdict.success, False, info
 
     def target(self, action: np.ndarray) -> np.ndarray:
-        """Joint angles [rad] and openings [m] (16,) that an action (16,) means now."""
+        """Return the joint angles [rad] and openings [m] (16,) of an action (16,) now."""
         return self._control.target(action, self._simulation.target)
 
     def action(self, target: np.ndarray) -> np.ndarray:
-        """Action (16,) float32 that means these joint angles [rad] and openings [m] now."""
+        """Return the action (16,) float32 for these joint angles [rad] and openings [m] now."""
         return self._control.action(target, self._simulation.target).astype(np.float32)
 
     def _progress(self) -> Any:

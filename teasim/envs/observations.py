@@ -1,24 +1,31 @@
-"""What an agent sees: joint state, environment state, camera pictures."""
+"""Observations: joint state, environment state, and pictures."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
 from teasim.common.errors import ConfigError
-from teasim.constants import STATE_NAMES
 from teasim.render import StationRenderer
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 
 OBS_TYPES = ("state", "pixels", "pixels_agent_pos")
+"""What observations can consist of."""
 LARGEST = 1000.0
-"""Bound of every state value: rad, m, ml and g all stay far below it."""
+"""Bound of every state value [rad, m, ml, g]; all of them stay far below it."""
 
 
 def observation_space(
-    obs_type: str, cameras: tuple[str, ...], height: int, width: int
+    obs_type: str, names: Sequence[str], cameras: Sequence[str], size: tuple[int, int]
 ) -> spaces.Dict:
-    """Space of the observations.
+    """Return the space of the observations.
+
+    Args:
+        obs_type: One of `OBS_TYPES`.
+        names: Dimensions of the joint state.
+        cameras: Cameras of the pictures.
+        size: Height and width of the pictures [pixels].
 
     Raises:
         ConfigError: unknown `obs_type`.
@@ -27,11 +34,11 @@ def observation_space(
         raise ConfigError(f"Unknown obs_type '{obs_type}'; choose {', '.join(OBS_TYPES)}.")
     parts: dict[str, spaces.Space[Any]] = {}
     if obs_type != "pixels":
-        parts["agent_pos"] = _vector(len(STATE_NAMES))
+        parts["agent_pos"] = _vector(len(names))
     if obs_type == "state":
         parts["environment_state"] = _vector(len(ENVIRONMENT_STATE_NAMES))
     else:
-        picture = spaces.Box(0, 255, (height, width, 3), np.uint8)
+        picture = spaces.Box(0, 255, (*size, 3), np.uint8)
         # As in PushT and ALOHA: one camera is a plain picture, several are a dict of pictures.
         several = len(cameras) > 1
         parts["pixels"] = spaces.Dict(dict.fromkeys(cameras, picture)) if several else picture
@@ -44,7 +51,7 @@ def observe(
     renderer: StationRenderer | None,
     cameras: tuple[str, ...],
 ) -> dict[str, Any]:
-    """The present observation, as `space` asks for it; every array is new."""
+    """Return the present observation in `space`; every array is new."""
     observation: dict[str, Any] = {}
     if "agent_pos" in space.spaces:
         observation["agent_pos"] = simulation.joint_state()

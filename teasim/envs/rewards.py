@@ -1,4 +1,4 @@
-"""The reward of the joint-level environment: named terms, summed with one weight each."""
+"""The reward of the joint-level environment: a weighted sum of named terms."""
 
 import math
 from collections.abc import Mapping
@@ -10,28 +10,29 @@ from teasim.common.errors import ConfigError
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
 from teasim.envs.registration import MAX_SECONDS
 from teasim.task.scoring import Verdict
+from teasim.task.subtasks import REGISTRY
 from teasim.world.collisions import CollisionCounter
 from teasim.world.simulation import Simulation
 from teasim.world.state import Saved
 
 OVEN_SECONDS = 60.0
-"""The oven may be on for this long; making tea in the best order takes it for about 40 s [s]."""
+"""Time for which the oven may be on [s]; the optimal order needs it for about 40 s."""
 
 
 @dataclass(frozen=True)
 class RewardWeights:
-    """What each term of the reward counts."""
+    """Weights of the terms of the reward, see `RewardTerms`."""
 
     subtasks: float = 1.0
-    """Of the share of the sub-tasks that were completed for the first time."""
+    """Weight of the share of sub-tasks that were completed for the first time."""
     success: float = 1.0
-    """Of reaching the goal."""
+    """Weight of reaching the goal."""
     spill: float = 0.001
-    """Of a ml or g on the table."""
+    """Weight of 1 ml or 1 g on the table."""
     collision: float = 0.01
-    """Of an arm or a hand beginning to touch what it must not."""
+    """Weight of a forbidden contact that begins."""
     unsafe: float = 0.1
-    """Of a whole episode with the oven on for too long."""
+    """Weight of an episode of full length with the oven on for too long."""
 
     def __post_init__(self) -> None:
         for name, weight in asdict(self).items():
@@ -41,7 +42,7 @@ class RewardWeights:
 
     @classmethod
     def of(cls, given: Mapping[str, float] | None) -> "RewardWeights":
-        """The default weights with those of `given` in their place.
+        """Return the default weights, replaced by those `given`.
 
         Raises:
             ConfigError: there is no term of that name, or a weight is not a finite number.
@@ -53,19 +54,19 @@ class RewardWeights:
         return cls(**(given or {}))
 
     def total(self, terms: Mapping[str, float]) -> float:
-        """The reward: the weighted sum of the terms."""
+        """Return the reward, the weighted sum of the terms."""
         return float(sum(getattr(self, name) * term for name, term in terms.items()))
 
 
 class RewardTerms(Saved):
-    """What happened since the last look, as one number per term; what is bad is negative.
+    """The terms of the reward since they were taken last; penalties are negative.
 
-    * `subtasks`: share of the seven that were completed for the first time; at most 1 in all.
+    * `subtasks`: share of the sub-tasks that were completed for the first time; at most 1 in total.
     * `success`: 1 when the goal is reached.
-    * `spill`: minus what came to lie on the table [ml or g]; at least -175 in all.
-    * `collision`: minus the forbidden contacts that began.
+    * `spill`: minus the amount that was spilled [ml or g]; at least -175 in total.
+    * `collision`: minus the number of forbidden contacts that began.
     * `unsafe`: minus the time for which the oven was on beyond `OVEN_SECONDS`, as a share of the
-      longest episode; above -1 in all.
+      longest episode; above -1 in total.
     """
 
     SAVED = ("_counted", "_spilled")
@@ -76,22 +77,22 @@ class RewardTerms(Saved):
         self.reset()
 
     def reset(self) -> None:
-        """Start a new episode, after the station came to rest."""
+        """Start a new episode, after the station has come to rest."""
         self._collisions.reset()
         self._counted = 0
         self._spilled = sum(self._simulation.liquids.spilled.values())
 
     def state(self) -> dict[str, Any]:
-        """As of every part, with the contacts."""
+        """Return everything that changes, with the contacts."""
         return super().state() | {"collisions": self._collisions.state()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `state()` gave."""
+        """Return to what `state()` gave."""
         super().restore(state)
         self._collisions.restore(state["collisions"])
 
     def take(self, verdict: Verdict) -> dict[str, float]:
-        """Terms of what happened since the last call; `verdict` is the one of now."""
+        """Return the terms since the last call, given the present verdict."""
         counted, spilled = self._counted, self._spilled
         self._counted = len(set(self._simulation.subtasks_done))
         self._spilled = sum(self._simulation.liquids.spilled.values())
@@ -105,10 +106,10 @@ class RewardTerms(Saved):
         }
 
     def _overtime(self) -> float:
-        """How much of the last control step the oven was on for longer than it may be [s]."""
+        """Return the part of the last control step in which the oven was on for too long [s]."""
         if not self._simulation.oven_on:
             return 0.0
         events = self._simulation.events
-        begun = max(event.time for event in events if event.subtask == "turn_on_oven")
+        begun = max(event.time for event in events if REGISTRY[event.subtask].oven)
         beyond = float(self._simulation.data.time) - begun - OVEN_SECONDS
         return min(max(beyond, 0.0), CONTROL_TIMESTEP)

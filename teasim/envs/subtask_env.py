@@ -1,6 +1,5 @@
-"""`teasim/TeaMakingSubtasks-v0`: every action is a whole sub-task, done in full physics."""
+"""`teasim/TeaMakingSubtasks-v0`: every action is a whole sub-task, carried out in full physics."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,37 +9,30 @@ from teasim.common.errors import ConfigError, SkillError
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
 from teasim.envs.base import StationEnv
 from teasim.rollout import run_subtask
-from teasim.skills.arm import Style
+from teasim.skills.style import Style
 
 REFUSED_SECONDS = 1.0
-"""The robot waits this long when a sub-task cannot be done from the present state [s]."""
+"""Rest after an action that cannot be carried out from the present state [s]."""
 
 
 class TeaMakingSubtasksEnv(StationEnv):
-    """Choose the next of the seven sub-tasks; the scripted skill carries it out.
+    """Choose the next sub-task; a scripted skill carries it out.
 
-    An action that cannot be done (a second tea bag, say) passes as a moment of waiting and is
-    named in `info["refused"]`. The reward is 1 when the goal is reached, 0 otherwise.
+    When an action cannot be carried out, for example a second tea bag, the robot waits for a moment
+    and `info["refused"]` says why. The reward is 1 when the goal is reached, 0 otherwise.
     """
 
-    def __init__(
-        self,
-        obs_type: str = "state",
-        cameras: Sequence[str] = ("left", "cup"),
-        width: int = 224,
-        height: int = 224,
-        render_mode: str | None = None,
-        quality: str = "fast",
-        randomize: bool = True,
-        look: str = "fixed",
-        max_actions: int = 14,
-    ) -> None:
-        """As `StationEnv`; the episode is cut off after `max_actions` actions.
+    def __init__(self, *, max_actions: int = 14, **kwargs: Any) -> None:
+        """Build the station.
+
+        Args:
+            max_actions: The episode is truncated after this number of actions.
+            **kwargs: The arguments of `StationEnv`.
 
         Raises:
             ConfigError: an argument is unknown or out of range.
         """
-        super().__init__(obs_type, cameras, width, height, render_mode, quality, randomize, look)
+        super().__init__(**kwargs)
         if max_actions < 1:
             raise ConfigError(f"max_actions is {max_actions}; choose 1 or more.")
         self.action_space = spaces.Discrete(len(SUBTASKS))
@@ -77,7 +69,7 @@ class TeaMakingSubtasksEnv(StationEnv):
         return ""
 
     def _recover(self) -> None:
-        """Stand still for a moment; skills refuse before they move."""
+        """Rest for a moment; a skill that cannot be carried out has not moved anything."""
         target = np.array(self._simulation.target)
         for _ in range(round(REFUSED_SECONDS / CONTROL_TIMESTEP)):
             self._simulation.step(target)

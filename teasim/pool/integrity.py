@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from teasim.common.errors import PoolError
-from teasim.pool.clips import check_decodable
+from teasim.pool.clips import check_decodable, probe
+from teasim.pool.lerobot.describing.metadata import require_pool_folder
 from teasim.pool.lerobot.episode import Episode
-from teasim.pool.lerobot.metadata import require_pool_folder
 from teasim.pool.lerobot.reader import Pool
 from teasim.pool.lerobot.soundness import Problem, sentences
 from teasim.pool.source import Clip
@@ -65,8 +65,9 @@ def _check_pictures(pool: Pool, episodes: Sequence[Episode]) -> Iterator[Problem
 
 
 def _check_file(path: Path) -> Iterator[str]:
-    check_decodable(path)
-    yield from ()
+    decoded, stored = check_decodable(path), probe(path).n_frames
+    if decoded < stored:
+        yield f"The video '{path}' is damaged: {decoded} of its {stored} frames can be decoded."
 
 
 def _check_images(clip: Clip) -> Iterator[str]:

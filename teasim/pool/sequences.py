@@ -60,11 +60,13 @@ class LabelledSequence:
         return () if labels is None else joined_spans(labels, self.folder.names)
 
     def predicted_spans(self) -> tuple[Span, ...]:
-        """Return the predicted segments.
+        """Return the predicted segments; none where the folder has no predictions.
 
         Raises:
-            PoolError: the labels are missing or damaged.
+            PoolError: other videos have predictions but this one does not, or they are damaged.
         """
+        if not self.folder.prediction_files:
+            return ()
         return joined_spans(self.folder.predictions(self.demo_id), self.folder.names)
 
     def posteriors(self) -> NDArray[np.float32] | None:

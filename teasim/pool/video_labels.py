@@ -60,7 +60,7 @@ def read_demonstrations(root: Path) -> dict[str, DemoRow]:
     Raises:
         PoolError: the table is damaged.
     """
-    return {row.demonstration: row for row in _read(root / DEMONSTRATIONS, DemoRow)}
+    return {cells[0]: DemoRow(*cells) for cells in _read(root / DEMONSTRATIONS, DemoRow)}
 
 
 def read_labels(root: Path) -> dict[str, tuple[Span, ...]]:
@@ -70,12 +70,12 @@ def read_labels(root: Path) -> dict[str, tuple[Span, ...]]:
         PoolError: the table is damaged.
     """
     labels: dict[str, tuple[Span, ...]] = {}
-    for row in _read(root / LABELS, LabelRow):
+    for name, subtask, start, stop in _read(root / LABELS, LabelRow):
         try:
-            span = Span(row.subtask, int(row.start), int(row.stop))
+            span = Span(subtask, int(start), int(stop))
         except ValueError as error:
             raise PoolError(f"'{root / LABELS}' holds text in place of a number.") from error
-        labels[row.demonstration] = (*labels.get(row.demonstration, ()), span)
+        labels[name] = (*labels.get(name, ()), span)
     return labels
 
 
@@ -92,8 +92,8 @@ def _write(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
     write_text(path, text.getvalue())
 
 
-def _read(path: Path, kind: type[Row]) -> list[Row]:
-    """Return the rows of a table whose head is that of `kind`; none of any other file."""
+def _read(path: Path, kind: type[Row]) -> list[list[str]]:
+    """Return the cells of the rows of a table whose head is that of `kind`; none of any other file."""
     columns = [field.name for field in fields(kind)]
     try:
         with path.open(encoding="utf-8", newline="") as stream:
@@ -106,4 +106,4 @@ def _read(path: Path, kind: type[Row]) -> list[Row]:
         return []  # a file of somebody else that happens to have this name
     if any(len(cells) != len(columns) for cells in lines):
         raise PoolError(f"A line of '{path}' does not have the columns {', '.join(columns)}.")
-    return [kind(*cells) for cells in lines]
+    return lines

@@ -1,13 +1,12 @@
-"""One arm as a skill sees it: motions are generators of targets, one per control step."""
+"""Motions of one arm, as generators of targets, one per control step."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from mink import SE3
 
 from teasim.common.errors import SkillError
-from teasim.constants import ARMS, CONTROL_TIMESTEP, GRIPPER_SQUEEZE
+from teasim.constants import ARMS, CONTROL_TIMESTEP
 from teasim.skills.geometry import (
     EASE_PEAK,
     between,
@@ -19,49 +18,28 @@ from teasim.skills.geometry import (
     turn_angle,
 )
 from teasim.skills.ik import kinematics
+from teasim.skills.style import Style
 from teasim.world.simulation import Simulation
 
 Motion = Iterator[np.ndarray]
 """Targets of successive control steps: (16,) for YuMi, (2 n + 2,) for n joints per arm."""
 
 Curve = Callable[[float], SE3]
-"""Poses of the hand over a share in [0, 1]."""
+"""Pose of the hand as a function of the share of the path in [0, 1]."""
 
 APPROACH = 0.07
-"""Length of the straight way in to a grasp and out again [m]."""
+"""Length of the straight approach to a grasp and of the retreat from it [m]."""
 SPEED_MARGIN = 0.85
-"""Share of the joints' largest speeds that a plan may use."""
+"""Share of the largest joint speeds that a plan may use."""
 SECOND_THOUGHTS = 0.8
-"""Somebody who gives up stands still for this long before turning back [s]."""
+"""Rest before a motion that is given up turns back [s]."""
 _REPLANS = 10
 _REHEARSAL_SAMPLES = 12
 _LARGEST_TURN = 0.30  # more than this between two samples is a jump to another elbow position [rad]
 
 
-@dataclass(frozen=True)
-class Style:
-    """How somebody does things: variation that is not a mistake."""
-
-    tempo: float = 1.7
-    """Speed of all motions relative to the nominal one."""
-    lift: float = 0.07
-    """Height by which things are lifted before they are carried [m]."""
-    bow: float = 0.0
-    """Sideways bow of the free motions between READY and an object [rad of the base joint, m]."""
-    pause: float = 0.3
-    """Rest before each sub-task [s]."""
-    stir_turns: float = 3.0
-    """Turns of the spoon in the cup."""
-    hand: str | None = None
-    """Preferred hand, for what the embodiment can do with either; None leaves it to the skill."""
-    hesitation: float = 0.0
-    """Stop in front of a thing before the hand goes in to take it [s]."""
-    regrasp: bool = False
-    """Whether a thing is taken, let go, and taken again."""
-
-
 class Arm:
-    """Plans and paces the motions of one arm; the other one keeps its last target."""
+    """Plans and times the motions of one arm; the other arm keeps its last target."""
 
     CARRY_SPEED = 0.35
     """Peak speed of the hand while carrying [m/s]."""
@@ -105,7 +83,7 @@ class Arm:
             yield self.simulation.target.copy()
 
     def hand(self, opening: float) -> Motion:
-        """Open or close to `opening` [m] and wait until the fingers have had time to get there."""
+        """Open or close to `opening` [m] and wait for as long as the fingers need."""
         before = max(float(self.simulation.joint_state()[self._hand]), 0.0)
         travel = abs(before - max(opening, 0.0)) / 2
         target = self.simulation.target.copy()
@@ -115,15 +93,15 @@ class Arm:
             yield target.copy()
 
     def squeeze(self) -> Motion:
-        """Close on whatever is between the fingers."""
+        """Close on whatever is between the fingers, with full force."""
         before = float(self.simulation.joint_state()[self._hand])
         target = self.simulation.target.copy()
-        target[self._hand] = GRIPPER_SQUEEZE
+        target[self._hand] = self._body.openings[0]
         for _ in range(_steps(max(before, 0.0) / 2 / self._body.finger_speed + 0.4)):
             yield target.copy()
 
     def park(self) -> Motion:
-        """Go back to READY and close the hand on the way."""
+        """Return to READY and close the hand on the way."""
         for target in self._free(self._body.ready[self._side]):
             target[self._hand] = 0.0
             yield target
@@ -161,16 +139,16 @@ class Arm:
     # -- grasps ----------------------------------------------------------------------------------
 
     def easier(self, grasp: SE3) -> SE3:
-        """The grasp itself or with the fingers exchanged: whichever is nearer to the posture."""
+        """Return the grasp, or that with exchanged fingers if it is nearer to the posture."""
         other = flipped(grasp)
         return grasp if self._distance(grasp) <= self._distance(other) else other
 
     def before(self, grasp: SE3) -> SE3:
-        """Where the straight way in to a grasp begins."""
+        """Return the pose at which the straight approach to a grasp begins."""
         return shifted(grasp, -APPROACH * rotation(grasp)[:, 2])
 
     def enter(self, grasp: SE3) -> Motion:
-        """Go in to a grasp and squeeze."""
+        """Approach a grasp and squeeze."""
         opening = float(self.simulation.target[self._hand])
         if self.style.hesitation:
             yield from self.wait(self.style.hesitation)
@@ -181,7 +159,7 @@ class Arm:
             yield from self.squeeze()
 
     def take(self, grasp: SE3, opening: float) -> Motion:
-        """Reach for a grasp from where nothing is in the way, go in, and squeeze."""
+        """Move to the start of the approach to a grasp, approach it, and squeeze."""
         yield from self.reach(self.before(grasp), opening)
         yield from self.enter(grasp)
 
@@ -191,13 +169,13 @@ class Arm:
         yield from self.line(shifted(self.tcp, -back * rotation(self.tcp)[:, 2]), 0.2)
 
     def turn_back(self, start: SE3, goal: SE3) -> Motion:
-        """Set out from `start` to `goal` with what is held, think again half-way, and return."""
+        """Move half-way from `start` to `goal`, rest, and return to `start`."""
         yield from self.line(between(start, goal, 0.5))
         yield from self.wait(SECOND_THOUGHTS)
         yield from self.line(start)
 
     def choose_way(self, ways: Sequence[Sequence[Curve]]) -> int:
-        """Number of the first way all curves of which can be followed; stay near its posture.
+        """Return the number of the first way whose curves can all be followed; keep its posture.
 
         Raises:
             SkillError: there is none, from any of the arm's postures.
@@ -208,7 +186,7 @@ class Arm:
                 if self._can_follow(curves):
                     return number
         raise SkillError(
-            f"The {self._side} arm finds no posture for its way; "
+            f"The {self._side} arm has no posture from which it can follow its path; "
             "move the object nearer to its nominal place."
         )
 
@@ -245,9 +223,9 @@ class Arm:
         return np.array(plan)
 
     def _excess_speed(self, plan: np.ndarray) -> float:
-        """Largest joint speed of a plan, as a share of what is allowed.
+        """Return the largest joint speed of a plan, as a share of the allowed speed.
 
-        The controller's cubic reaches two thirds through a step what neither of its ends has.
+        The controller's cubic is fastest two thirds through a step, not at its ends.
         """
         speeds = np.diff(plan, axis=0, prepend=self.joints[None]) / CONTROL_TIMESTEP
         before = np.vstack([np.zeros(self._body.width), speeds[:-1]])
@@ -272,5 +250,5 @@ class Arm:
 
 
 def _steps(seconds: float) -> int:
-    """Number of control steps that last at least `seconds`."""
+    """Return the number of control steps that last at least `seconds`."""
     return max(int(np.ceil(seconds / CONTROL_TIMESTEP - 1e-9)), 1)

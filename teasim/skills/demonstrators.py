@@ -1,4 +1,4 @@
-"""Who demonstrates: honest variation of tempo and path that is not a mistake."""
+"""The participants: variation of tempo, path and order that is not a mistake."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,8 +8,8 @@ import numpy as np
 
 from teasim.common.errors import ConfigError
 from teasim.constants import ARMS
-from teasim.skills.arm import Style
-from teasim.task.recipes import SEQ_1, is_legal
+from teasim.skills.style import Style
+from teasim.task.recipes import SEQ_1, is_legal, moved
 from teasim.world.embodiments import EMBODIMENTS
 from teasim.world.person import Appearance
 
@@ -18,12 +18,12 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Participant:
-    """Somebody who demonstrates, with habits of their own: ranges of styles are drawn from them."""
+    """A demonstrator with habits: the ranges from which styles are drawn."""
 
     name: str
     """Name in the registry."""
     embodiment: str
-    """The body the skills are carried out with."""
+    """The body that carries out the skills."""
     tempo: Range
     """Speed of all motions relative to the nominal one."""
     lift: Range
@@ -35,15 +35,15 @@ class Participant:
     stir_turns: Range
     """Turns of the spoon in the cup."""
     appearance: Appearance | None = None
-    """Colours of skin and clothes; None for a body that has neither."""
+    """Colours of skin and clothes; None for a robot."""
     hand: str | None = None
-    """The hand that takes the tea bag and the spoon; None when there is no choice."""
+    """Preferred hand where the body can use either; None if it has no choice."""
     hesitates: float = 0.0
-    """How probable it is that the hand stops in front of a thing, per sub-task."""
+    """Probability per sub-task that the hand stops in front of a thing."""
     regrasps: float = 0.0
-    """How probable it is that a thing is taken twice, per sub-task."""
+    """Probability per sub-task that a thing is grasped twice."""
     orders: tuple[tuple[str, ...], ...] = (SEQ_1,)
-    """Correct orders that come naturally, the most usual one first."""
+    """Habitual correct orders, the most usual one first."""
 
     def __post_init__(self) -> None:
         """Check the habits.
@@ -78,35 +78,12 @@ OPERATOR = Participant(
     hesitates=0.06,
     regrasps=0.04,
 )
-"""The robot, led by its operator, who is always the same."""
+"""The robot, led by its only operator."""
 
-_SUGAR_LAST = (
-    "turn_on_oven",
-    "add_tea_bag",
-    "add_milk",
-    "add_sugar",
-    "turn_off_oven",
-    "add_water",
-    "stir",
-)
-_WATER_EARLY = (
-    "turn_on_oven",
-    "add_tea_bag",
-    "turn_off_oven",
-    "add_water",
-    "add_sugar",
-    "add_milk",
-    "stir",
-)
-_MILK_LAST = (
-    "turn_on_oven",
-    "add_tea_bag",
-    "add_sugar",
-    "turn_off_oven",
-    "add_water",
-    "add_milk",
-    "stir",
-)
+_SUGAR_LAST = moved(SEQ_1, "add_sugar", after="add_milk")
+_OFF_EARLY = moved(SEQ_1, "turn_off_oven", after="add_tea_bag")
+_WATER_EARLY = moved(_OFF_EARLY, "add_water", after="turn_off_oven")
+_MILK_LAST = moved(SEQ_1, "add_milk", after="add_water")
 
 _PEOPLE = (
     Participant(
@@ -156,6 +133,7 @@ _PEOPLE = (
 PARTICIPANTS: Mapping[str, Participant] = MappingProxyType(
     {participant.name: participant for participant in (OPERATOR, *_PEOPLE)}
 )
+"""All participants by name."""
 
 
 def sample_style(rng: np.random.Generator, participant: Participant = OPERATOR) -> Style:
@@ -171,7 +149,7 @@ def sample_style(rng: np.random.Generator, participant: Participant = OPERATOR) 
 
 
 def varied(style: Style, rng: np.random.Generator, participant: Participant = OPERATOR) -> Style:
-    """The style as it comes out in one sub-task: nobody does everything alike throughout."""
+    """Draw the style of one sub-task, which varies around the demonstration's style."""
     tempo, pause = rng.uniform(0.94, 1.06), rng.uniform(0.7, 1.3)
     style = replace(style, tempo=style.tempo * tempo, pause=style.pause * pause)
     if participant.hesitates and rng.random() < participant.hesitates:

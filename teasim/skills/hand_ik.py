@@ -11,14 +11,14 @@ _AXES = np.eye(3)
 
 
 ROUNDING = 1e-9
-"""A solution may be this far outside of the planning limits [m, rad]."""
+"""Largest distance of a solution from the planning limits, for rounding [m, rad]."""
 
 
 class HandKinematics:
     """Forward and inverse kinematics of one hand at its tool centre point.
 
-    R = Rx(roll) Ry(pitch) Rz(yaw) R_down, unique for |pitch| < 90 degrees: a hand may point
-    anywhere but straight back or straight ahead.
+    R = Rx(roll) Ry(pitch) Rz(yaw) R_down, unique for |pitch| < 90 degrees: a hand may point in
+    any direction but straight back or straight ahead.
     """
 
     def __init__(self, arm: str) -> None:
@@ -26,15 +26,15 @@ class HandKinematics:
         self._down = POINTING_DOWN[arm]
 
     def prefer(self, posture: np.ndarray) -> None:
-        """Do nothing: there is no spare joint that a `posture` (6,) could decide about."""
+        """Do nothing: there is no spare joint that a `posture` (6,) could decide."""
 
     def pose(self, joints: np.ndarray) -> SE3:
-        """Pose of the tool centre point at coordinates (6,) [m, rad]."""
+        """Return the pose of the tool centre point at coordinates (6,) [m, rad]."""
         roll, pitch, yaw = (about(a, t) for a, t in zip(_AXES, joints[3:], strict=True))
         return pose(joints[:3], roll @ pitch @ yaw @ self._down)
 
     def solve(self, goal: SE3, seed: np.ndarray) -> np.ndarray:
-        """Coordinates (6,) [m, rad] of `goal`, its turns the nearest to those of `seed` (6,).
+        """Return coordinates (6,) [m, rad] of `goal`, with the turns nearest to `seed` (6,).
 
         Raises:
             SkillError: it is outside of the planning limits.

@@ -1,7 +1,6 @@
 """Inverse kinematics of one arm; YuMi's by mink's quadratic programs with the soft limits."""
 
 from collections.abc import Callable, Mapping
-from functools import cache
 from types import MappingProxyType
 from typing import Protocol
 
@@ -15,30 +14,31 @@ from teasim.skills.hand_ik import HandKinematics
 from teasim.world.yumi import READY, planning_model
 
 POSITION_TOLERANCE = 5e-4
-"""A solution is this near to the wanted position [m]."""
+"""Largest position error of a solution [m]."""
 ANGLE_TOLERANCE = 5e-3
-"""A solution is this near to the wanted orientation [rad]."""
+"""Largest orientation error of a solution [rad]."""
 _ITERATIONS = 40
 
 
 class Kinematics(Protocol):
-    """Between the joints of one arm (n,) and the pose of its tool centre point."""
+    """Converts between the joints of one arm (n,) and the pose of its tool centre point."""
 
     def prefer(self, posture: np.ndarray) -> None:
         """Stay near `posture` (n,) where there is a choice."""
 
     def pose(self, joints: np.ndarray) -> mink.SE3:
-        """Pose at `joints` (n,)."""
+        """Return the pose at `joints` (n,)."""
 
     def solve(self, goal: mink.SE3, seed: np.ndarray) -> np.ndarray:
-        """Joints (n,) near `seed` (n,) that reach `goal`, or a `SkillError`."""
+        """Return joints (n,) near `seed` (n,) that reach `goal`, or raise `SkillError`."""
 
 
 class ArmKinematics:
     """Forward and inverse kinematics of one arm at its tool centre point.
 
     The arm has seven joints for six coordinates; the spare one is used to stay near a reference
-    posture, so the same pose always gives nearly the same joint angles.
+    posture, so the same pose always gives nearly the same joint angles. The posture and the last
+    configuration are state: every user needs an instance of its own.
     """
 
     def __init__(self, arm: str) -> None:
@@ -63,12 +63,12 @@ class ArmKinematics:
         return q
 
     def pose(self, joints: np.ndarray) -> mink.SE3:
-        """Pose of the tool centre point at joint angles (7,) [rad]."""
+        """Return the pose of the tool centre point at joint angles (7,) [rad]."""
         self._configuration.update(self._full(joints))
         return self._configuration.get_transform_frame_to_world(self._tcp, "site")
 
     def solve(self, goal: mink.SE3, seed: np.ndarray) -> np.ndarray:
-        """Joint angles (7,) [rad] that bring the tool centre point to `goal`, started at `seed`.
+        """Return joint angles (7,) [rad] for the pose `goal`, searched from `seed` (7,) [rad].
 
         Raises:
             SkillError: no solution within the tolerances and the soft limits.
@@ -105,7 +105,6 @@ KINEMATICS: Mapping[str, Callable[[str], Kinematics]] = MappingProxyType(
 """The kinematics of every embodiment."""
 
 
-@cache
 def kinematics(arm: str, embodiment: str = "yumi") -> Kinematics:
-    """The kinematics of an arm, made once per process."""
+    """Return new kinematics of an arm; they share nothing that changes with earlier ones."""
     return KINEMATICS[embodiment](arm)

@@ -17,6 +17,7 @@ from teasim.constants import CONTROL_TIMESTEP
 from teasim.skills.arm import Arm, Curve, Motion
 from teasim.skills.geometry import DOWN, UP, about, between, pose, rotation, shifted, tool
 from teasim.task.mistakes import ABANDONED, INEFFECTIVE, Manner
+from teasim.task.subtasks import find_subtask
 from teasim.world.liquids import RIM_HEIGHT
 from teasim.world.simulation import Simulation
 from teasim.world.station import NOMINAL, body_name
@@ -34,7 +35,7 @@ SPOUT_HEIGHT = 0.025
 DESCENT = 0.06
 """The hand comes down this far before it goes in to the handle [m]."""
 LONGEST_HOLD = 4.0
-"""A vessel is held over the cup at most this long [s]."""
+"""A vessel is held over the cup for at most this time [s]."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,21 @@ class Aim:
 
 
 WELL_AIMED = (Aim(),)
+"""Into the cup, until the vessel is empty."""
 BESIDE = tuple(
     Aim((x, y, 0.0)) for x, y in ((-0.085, 0), (-0.06, 0.06), (-0.06, -0.06), (0.085, 0))
 )
-"""Past the cup, on the side the arm can reach."""
+"""Beside the cup, on a side that the arm can reach, best first."""
+TOO_LITTLE = (Aim(share=0.25, hold=2.0),)
+"""Over the cup, at a tilt at which the content still stands below the vessel's lip."""
 
 
 @dataclass(frozen=True)
 class Grip:
-    """How a vessel is grasped and where its spout is."""
+    """How a vessel is grasped, and where its spout is."""
 
+    subtask: str
+    """The sub-task that pours from the vessel."""
     vessel: str
     """Name of the vessel."""
     opening: float
@@ -70,21 +76,18 @@ class Grip:
     """Tip of the spout in the vessel's frame [m]."""
     closing: float = 1.0
     """1 when the hand's closing axis points to the spout, -1 when it points to the handle."""
-    poorly: tuple[Aim, ...] = BESIDE
-    """How an ineffective pour may be aimed, best first."""
 
 
-KETTLE = Grip("kettle", 0.030, 0.042, (0.062, 0.0, 0.072), -1.0)
-# At a quarter of the tilt the milk still stands below the jug's lip.
-MILK_JUG = Grip("milk_jug", 0.022, 0.026, (0.036, 0.0, 0.062), poorly=(Aim(share=0.25, hold=2.0),))
-SUGAR_POT = Grip("sugar_pot", 0.022, 0.026, (0.034, 0.0, 0.052))
+KETTLE = Grip("add_water", "kettle", 0.030, 0.042, (0.062, 0.0, 0.072), -1.0)
+MILK_JUG = Grip("add_milk", "milk_jug", 0.022, 0.026, (0.036, 0.0, 0.062))
+SUGAR_POT = Grip("add_sugar", "sugar_pot", 0.022, 0.026, (0.034, 0.0, 0.052))
 
 
 def pour(arm: Arm, grip: Grip, manner: Manner) -> Motion:
     """Pour the vessel into the cup until it is empty and put it back where it stood.
 
-    Told to be ineffective, it misses the cup or tilts the vessel too little; told to abandon it,
-    it puts the vessel back half-way.
+    An ineffective pour misses the cup or tilts the vessel too little; an abandoned one puts the
+    vessel back half-way.
 
     Raises:
         SkillError: the vessel does not stand upright.
@@ -94,7 +97,7 @@ def pour(arm: Arm, grip: Grip, manner: Manner) -> Motion:
     if rotation(home)[2, 2] < np.cos(np.radians(15)):
         raise SkillError(f"The {grip.vessel} does not stand upright; reset the station.")
     grasp = _grasp(simulation, grip, home)
-    aims = grip.poorly if manner == INEFFECTIVE else WELL_AIMED
+    aims = _poor_aims(grip) if manner == INEFFECTIVE else WELL_AIMED
     aim = aims[arm.choose_way([rehearsal(arm, grip, home, grasp, aim) for aim in aims])]
     # From above: the straight way in joint space would sweep the hand through the vessel.
     yield from arm.reach(shifted(arm.before(grasp), DESCENT * UP), grip.opening)
@@ -115,8 +118,13 @@ def pour(arm: Arm, grip: Grip, manner: Manner) -> Motion:
     yield from arm.park()
 
 
+def _poor_aims(grip: Grip) -> tuple[Aim, ...]:
+    """Return how an ineffective pour may be aimed, best first."""
+    return BESIDE if find_subtask(grip.subtask).misses else TOO_LITTLE
+
+
 def _tip(arm: Arm, grip: Grip, tilted: Curve, aim: Aim) -> Motion:
-    """Go to the cup, tilt, wait until nothing flows any more, and turn upright again."""
+    """Move to the cup, tilt, wait until nothing flows any more, and turn upright again."""
     yield from arm.line(tilted(0.0))
     seconds = FULL_TILT / arm.TURN_SPEED * 1.6
     yield from arm.path(tilted, seconds)
@@ -126,7 +134,7 @@ def _tip(arm: Arm, grip: Grip, tilted: Curve, aim: Aim) -> Motion:
 
 
 def rehearsal(arm: Arm, grip: Grip, home: SE3, grasp: SE3, aim: Aim) -> list[Curve]:
-    """The way of the hand from the approach to the full tilt, as it should go."""
+    """Return the planned path of the hand from the approach to the full tilt."""
     before = arm.before(grasp)
     lifted = shifted(grasp, arm.style.lift * UP)
     tilted = _over_cup(arm.simulation, grip, home.inverse() @ grasp, aim)
@@ -163,7 +171,7 @@ def _grasp(simulation: Simulation, grip: Grip, home: SE3) -> SE3:
 
 
 def _over_cup(simulation: Simulation, grip: Grip, held: SE3, aim: Aim) -> Curve:
-    """Pose of the hand for a share of the way to the aim's tilt, the spout kept over the cup."""
+    """Return the pose of the hand by the share of the aim's tilt, the spout kept over the cup."""
     cup = simulation.data.body(body_name("cup")).xpos + np.array(aim.offset)
     yaw = NOMINAL[grip.vessel].yaw
     towards = np.array([np.cos(yaw), np.sin(yaw), 0.0])
@@ -182,7 +190,7 @@ def _over_cup(simulation: Simulation, grip: Grip, held: SE3, aim: Aim) -> Curve:
 
 
 def spout_offset(grip: Grip, tilt: float) -> float:
-    """Distance of the spout from the cup's axis that keeps the belly clear of the rim [m]."""
+    """Return the spout's distance from the cup's axis that keeps the belly off the rim [m]."""
     overhang = grip.spout[0] - grip.belly
     if tilt >= np.radians(80):
         return 0.0
@@ -192,10 +200,10 @@ def spout_offset(grip: Grip, tilt: float) -> float:
 
 
 def _until_empty(arm: Arm, grip: Grip, aim: Aim) -> Motion:
-    """Hold until nothing flows any more: by the level, not by the clock."""
+    """Hold the vessel until its level, not a clock, says that it is empty."""
     liquids = arm.simulation.liquids
     if aim.share < 1:
-        return  # it never will be
+        return  # it stays full
     for _ in range(round(LONGEST_HOLD / CONTROL_TIMESTEP)):
         yield from arm.wait(CONTROL_TIMESTEP)
         if liquids.amounts[grip.vessel] < 0.5:

@@ -1,1 +1,1 @@
-"""What it means: the sub-tasks, the recipes, the mistakes, and how an episode is scored."""
+"""The task: its sub-tasks, correct orders, mistakes, and how an episode is scored."""

@@ -1,4 +1,4 @@
-"""Write a look into a compiled station; another look replaces it, nothing is compiled again."""
+"""Write a look into a compiled station; a later look replaces it without a new compilation."""
 
 from functools import cache
 
@@ -10,19 +10,19 @@ from teasim.world.station import station_model
 
 _SHOWN, _HIDDEN = 2, 5  # groups of shapes; see assets/tea_station/looks.xml
 _UP = np.array([0.0, 0.0, 1.0])
+_SURFACES = ("table", "table_grain", "ground", "ground_plain", "wall", "cloth", "stripe")
 
 
 @cache
 def _original() -> mujoco.MjModel:
-    """The station as compiled: what a look starts from, looked up by name."""
+    """Return the station as compiled, the base of every look."""
     return station_model()
 
 
 def apply_look(model: mujoco.MjModel, look: Look, data: mujoco.MjData | None = None) -> None:
-    """Write `look` into `model`, whatever look it had before; no state and no contact changes.
+    """Write `look` into `model` in place of its present look; states and contacts do not change.
 
-    With `data`, a picture can be taken at once; otherwise the next reset or step brings it up to
-    date.
+    With `data`, a picture can be taken at once; otherwise only after the next reset or step.
     """
     _light(model, look.light)
     _surfaces(model, look)
@@ -35,6 +35,18 @@ def apply_look(model: mujoco.MjModel, look: Look, data: mujoco.MjData | None = N
     _distractors(model, look.distractors)
     if data is not None:
         _bring_up_to_date(model, data)
+
+
+@cache
+def dressed_materials() -> tuple[str, ...]:
+    """Return the names of the materials whose colours a look decides."""
+    materials = (_original().mat(k).name for k in range(_original().nmat))
+    return (*_SURFACES, *(name for name in materials if "/" in name))
+
+
+def is_distractor(body: str) -> bool:
+    """Whether the body of this name is a distractor."""
+    return body.startswith("distractor_")
 
 
 def _light(model: mujoco.MjModel, light: Light) -> None:
@@ -56,7 +68,7 @@ def _surfaces(model: mujoco.MjModel, look: Look) -> None:
     coloured = {
         "table": look.table,
         "table_grain": look.table,
-        "floor_plain": look.floor,
+        "ground_plain": look.ground,
         "wall": look.wall,
         "cloth": cloth.colour if cloth else None,
         "stripe": cloth.stripe if cloth else None,
@@ -64,8 +76,8 @@ def _surfaces(model: mujoco.MjModel, look: Look) -> None:
     for name, colour in coloured.items():
         before = _original().mat(name).rgba
         model.mat(name).rgba = before if colour is None else (*colour, 1)
-    tiles, plain = _original().mat("floor").rgba, _original().mat("floor_plain").rgba
-    model.mat("floor").rgba = tiles * model.mat("floor_plain").rgba / plain
+    tiles, plain = _original().mat("ground").rgba, _original().mat("ground_plain").rgba
+    model.mat("ground").rgba = tiles * model.mat("ground_plain").rgba / plain
     for wall in ("wall_back", "wall_right"):
         _show(model, model.geom(wall).id, look.wall is not None)
 
@@ -104,7 +116,7 @@ def _distractors(model: mujoco.MjModel, things: tuple[Distractor, ...]) -> None:
     wanted = {f"distractor_{thing.name}": thing for thing in things}
     for geom in range(model.ngeom):
         body = model.body(model.geom_bodyid[geom]).name
-        if not body.startswith("distractor_"):
+        if not is_distractor(body):
             continue
         _show(model, geom, body in wanted)
         name = model.geom(geom).name
@@ -118,14 +130,14 @@ def _distractors(model: mujoco.MjModel, things: tuple[Distractor, ...]) -> None:
 
 
 def _bring_up_to_date(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Put what does not move where it now is, without touching what physics will read."""
+    """Update the poses of cameras, lamp and distractors without changing what physics reads."""
     still = mujoco.MjData(model)
     mujoco.mj_kinematics(model, still)
     mujoco.mj_camlight(model, still)
     data.cam_xpos[:], data.cam_xmat[:] = still.cam_xpos, still.cam_xmat
     data.light_xpos[:], data.light_xdir[:] = still.light_xpos, still.light_xdir
     for geom in range(model.ngeom):
-        if model.body(model.geom_bodyid[geom]).name.startswith("distractor_"):
+        if is_distractor(model.body(model.geom_bodyid[geom]).name):
             data.geom_xpos[geom], data.geom_xmat[geom] = (
                 still.geom_xpos[geom],
                 still.geom_xmat[geom],
@@ -137,7 +149,7 @@ def _show(model: mujoco.MjModel, geom: int, shown: bool) -> None:
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Quaternion (4,), wxyz, of a turn by `angle` [rad]; exactly the identity for no turn."""
+    """Return the quaternion (4,), wxyz, of a turn by `angle` [rad]; the identity for no turn."""
     length = float(np.linalg.norm(axis))
     if not angle or not length:
         return np.array([1.0, 0.0, 0.0, 0.0])

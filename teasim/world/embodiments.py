@@ -1,4 +1,4 @@
-"""Who works at the station: the bodies a skill can be carried out with."""
+"""The bodies that can work at the station, and every fact about them that others need."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from teasim.common.registry import named
-from teasim.constants import ARM_JOINTS
+from teasim.constants import ARM_JOINTS, ARMS, GRIPPER_OPEN, GRIPPER_SQUEEZE
 from teasim.world.person import (
     HAND_JOINTS,
     HAND_RANGE,
@@ -17,7 +17,14 @@ from teasim.world.person import (
     Limbs,
     mount_person,
 )
-from teasim.world.yumi import FINGER_SPEED, JOINT_SPEEDS, READY, SOFT_LIMITS, mount_yumi
+from teasim.world.yumi import (
+    FINGER_SPEED,
+    JOINT_SPEEDS,
+    POSTURES,
+    READY,
+    SOFT_LIMITS,
+    mount_yumi,
+)
 
 Painter = Callable[[mujoco.MjData], None]
 
@@ -28,17 +35,17 @@ def _nothing_to_paint(model: mujoco.MjModel) -> Painter:  # noqa: ARG001
 
 @dataclass(frozen=True, eq=False)
 class Embodiment:
-    """A body with two arms of n joints each, every one with its own motor, and two fingers each.
+    """A body with two arms of n joints, each with its own motor, and two fingers per arm.
 
-    A target holds the right arm's joints, the left arm's, and both openings: (2 n + 2,).
+    A target is the right arm's joints, the left arm's joints, and both openings: (2 n + 2,).
     """
 
     name: str
     """Name in the registry."""
     joints: Mapping[str, tuple[str, ...]]
-    """Names of the joints, and of their motors, per side."""
+    """Names of the joints, and of their motors, by side."""
     ready: Mapping[str, np.ndarray]
-    """Start and park pose per side (n,) [rad or m]."""
+    """Start and park pose by side (n,) [rad or m]."""
     limits: np.ndarray
     """Planning limits (n, 2) [rad or m]."""
     speeds: np.ndarray
@@ -46,22 +53,36 @@ class Embodiment:
     reach_speeds: np.ndarray
     """Peak joint speeds of free motions at nominal tempo (n,) [rad/s or m/s]."""
     bow: np.ndarray
-    """Which joints a style's bow moves aside in free motions, and how much of it (n,)."""
+    """Weight of every joint in the sideways bow that a style adds to free motions (n,)."""
     arc: np.ndarray
-    """How far the joints leave the straight way in the middle of free motions (n,) [rad or m]."""
+    """Deviation of the joints from the straight way amid free motions (n,) [rad or m]."""
     finger_speed: float
     """Speed of each finger [m/s]."""
     mount: Callable[[mujoco.MjSpec], None]
-    """Puts the body into a station."""
+    """Adds the body to a station."""
+    openings: tuple[float, float] = (GRIPPER_SQUEEZE, GRIPPER_OPEN)
+    """Opening commands of the grippers: squeezing with full force, and wide open [m]."""
+    postures: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
+    """Joint angles an arm stays near by sub-task, best first (n,) [rad]; by default `ready`."""
     painter: Callable[[mujoco.MjModel], Painter] = field(default=_nothing_to_paint)
-    """Makes what brings shapes up to date that physics does not move."""
-    either_hand: frozenset[str] = frozenset()
-    """Sub-tasks that can be done with the right hand as well as with the left."""
+    """Makes a function that updates shapes which physics does not move."""
+    equal_hands: bool = False
+    """Whether either hand can do what does not depend on the reach of one arm."""
+    logged: bool = True
+    """Whether demonstrations have a log of states and actions; without one they are films only."""
+    robot_type: str | None = None
+    """Name of the robot in pools; None for a person."""
 
     @property
     def width(self) -> int:
         """Number of joints of one arm."""
         return len(self.speeds)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the dimensions of a target, which are the columns of the joint log."""
+        joints = (name for arm in ARMS for name in self.joints[arm])
+        return (*joints, *(f"{arm}_gripper" for arm in ARMS))
 
 
 YUMI = Embodiment(
@@ -75,6 +96,8 @@ YUMI = Embodiment(
     arc=np.zeros(7),
     finger_speed=FINGER_SPEED,
     mount=mount_yumi,
+    postures=POSTURES,
+    robot_type="abb_yumi",
 )
 
 PERSON = Embodiment(
@@ -89,12 +112,14 @@ PERSON = Embodiment(
     finger_speed=0.06,
     mount=mount_person,
     painter=lambda model: Limbs(model).paint,
-    either_hand=frozenset({"add_tea_bag", "stir"}),
+    equal_hands=True,
+    logged=False,
 )
 
 EMBODIMENTS: Mapping[str, Embodiment] = MappingProxyType(
     {embodiment.name: embodiment for embodiment in (YUMI, PERSON)}
 )
+"""All embodiments by name."""
 
 
 def find_embodiment(name: str) -> Embodiment:

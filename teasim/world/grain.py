@@ -1,4 +1,4 @@
-"""The grain of the table's wood, drawn in memory; only `nice` pictures show it."""
+"""The wood grain of the table, drawn in memory; only `nice` pictures show it."""
 
 import mujoco
 import numpy as np
@@ -7,7 +7,7 @@ _ALONG, _ACROSS = 128, 512  # pixels of the texture, along the grain and across 
 
 
 def add_grain(spec: mujoco.MjSpec) -> None:
-    """Give the station a material "table_grain": that of the table with planks and grain."""
+    """Add a material "table_grain" to the station: the table's material with planks and grain."""
     texture = spec.add_texture(
         name="grain",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
@@ -28,11 +28,11 @@ def add_grain(spec: mujoco.MjSpec) -> None:
 
 
 def _grain() -> np.ndarray:
-    """Brightness of the wood (across, along) uint8: white where it has the table's colour."""
+    """Return the brightness of the wood (across, along) uint8; white is the table's own colour."""
     rng = np.random.default_rng(0)
     across = (np.arange(_ACROSS) / _ACROSS)[:, None]
     along = np.linspace(0, 2 * np.pi, _ALONG)[None, :]
-    plank = np.floor(across * 8).astype(int)
+    plank = (across * 8).astype(int)
     offset = rng.uniform(0, 2 * np.pi, 8)[plank]
     wave = across * 8 + 0.05 * np.sin(along + offset) + 0.02 * np.sin(2 * along + 2 * offset)
     rings = 0.5 + 0.25 * np.sin(2 * np.pi * 5 * wave + offset) + 0.25 * np.sin(60 * wave)

@@ -1,4 +1,4 @@
-"""Water, milk, sugar and tea as levels: they flow when a vessel is tilted, and can be seen."""
+"""Water, milk, sugar and tea as levels: they flow when a vessel is tilted, and are drawn."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -14,17 +14,26 @@ FLOW_LIMIT = 40.0
 FLOW_TIME = 0.15
 """Time constant of the outflow once the level is above the lip [s]."""
 CATCH_RADIUS = 0.034
-"""A stream lands in the cup when the spout is this near to the cup's axis [m]."""
+"""Largest distance between spout and cup's axis at which a stream lands in the cup [m]."""
 RIM_HEIGHT = 0.072
 """Height of the cup's rim above its underside [m]."""
 CUP_RADIUS = 0.0355
 """Inner radius of the cup [m]."""
-CUP_FLOOR = 0.006
+CUP_BASE = 0.006
 """Thickness of the cup's base [m]."""
 BREW_TIME = 8.0
 """Time constant of the tea getting stronger while nobody stirs [s]."""
 STIR_TIME = 1.0
 """Time constant of tea, milk and sugar mixing while the spoon moves in the liquid [s]."""
+PUDDLE_HEIGHT = 0.0057
+"""Height of a puddle's middle [m]: its mean is then 3.8 mm, which surface tension gives water at a
+contact angle of 90 degrees, twice the capillary length of 2.7 mm times sin 45 degrees."""
+HEAP_SLOPE = np.tan(np.radians(35))
+"""Slope of heaped sugar: its angle of repose is about 35 degrees."""
+SUGAR_DENSITY = 0.85
+"""Bulk density of granulated sugar [g/ml]."""
+LOBES = ((0.0, 0.0, 1.0), (0.62, 0.42, 0.60), (-0.70, 0.30, 0.55), (0.10, -0.72, 0.55))
+"""Shape of a puddle: place (x, y) and radius of each lobe, in radii of the largest one."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Vessel:
     """A vessel that can be poured from."""
 
     content: str
-    """What is in it."""
+    """Name of the content."""
     filling: float
     """Amount at the start [ml, or g of sugar]."""
     radius: float
@@ -46,7 +55,9 @@ VESSELS = {
     "milk_jug": Vessel("milk", 50.0, 0.023, 0.057),
     "sugar_pot": Vessel("sugar", 25.0, 0.023, 0.049),
 }
+"""All vessels by name."""
 CONTENTS = tuple(vessel.content for vessel in VESSELS.values())
+"""Names of the contents, in the order of the vessels."""
 _UPRIGHT = np.cos(np.radians(10))
 
 _COLOURS = {"water": (0.62, 0.76, 0.88), "tea": (0.46, 0.19, 0.05), "milk": (0.97, 0.94, 0.87)}
@@ -60,7 +71,7 @@ _STREAMS = {
 
 @dataclass(frozen=True)
 class Stream:
-    """A stream in the air, for the eye only."""
+    """A stream in the air; only pictures show it."""
 
     start: np.ndarray
     """Spout (3,) [m]."""
@@ -72,7 +83,7 @@ class Stream:
 
 @cache
 def _held_table(radius: float, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Volume a tilted cylinder can hold, tabulated over the tilt in 1-degree steps [ml]."""
+    """Return tilts in 1-degree steps [rad] and the volumes a cylinder holds at each [ml]."""
     x = np.linspace(-radius, radius, 401)
     width = 2 * np.sqrt(np.maximum(radius**2 - x**2, 0))
     tilts = np.radians(np.arange(0, 90))
@@ -82,37 +93,75 @@ def _held_table(radius: float, height: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held_volume(vessel: Vessel, tilt: float) -> float:
-    """Largest volume [ml] the vessel holds when tilted by `tilt` [rad] towards its spout."""
+    """Return the largest volume [ml] the vessel holds at a `tilt` [rad] towards its spout."""
     tilts, volumes = _held_table(vessel.radius, vessel.height)
     return float(np.interp(tilt, tilts, volumes))
+
+
+def puddle_shape(content: str, lobe: int) -> str:
+    """Return the name of the shape, half an ellipsoid on the table, that shows a lobe."""
+    return f"spill_{content}_{lobe}"
+
+
+def puddle_size(content: str, amount: float) -> tuple[float, float]:
+    """Return radius and height [m] of the largest lobe of a spilled amount [ml or g].
+
+    The height of a liquid is given by surface tension, that of a heap by its slope: half an
+    ellipsoid has a cone's volume at half the cone's height.
+    """
+    if content == "sugar":
+        volume, slope = amount * 1e-6 / SUGAR_DENSITY, HEAP_SLOPE / 2
+        radius = (volume / (_puddle_volume() * slope)) ** (1 / 3)
+        return float(radius), float(radius * slope)
+    return float(np.sqrt(amount * 1e-6 / (_puddle_volume() * PUDDLE_HEIGHT))), PUDDLE_HEIGHT
+
+
+@cache
+def _puddle_volume() -> float:
+    """Return the volume of a puddle whose largest lobe has unit radius and unit height."""
+    places = np.linspace(-1.6, 1.6, 801)
+    x, y = np.meshgrid(places, places)
+    lobes = [
+        share * np.sqrt(np.maximum(1 - ((x - across) ** 2 + (y - along) ** 2) / share**2, 0))
+        for across, along, share in LOBES
+    ]
+    return float(np.max(lobes, axis=0).sum() * (places[1] - places[0]) ** 2)
 
 
 class Liquids(Saved):
     """Amounts in the vessels, in the cup and on the table.
 
-    Masses of the bodies stay what they are: the 25 to 100 g that move are within what the grasps
-    hold, and changing a body's mass in mid-contact makes light vessels jump.
+    The masses of the bodies do not change: the grasps hold the 25 to 100 g that move anyway, and a
+    change of mass during a contact makes light vessels jump.
     """
 
-    SAVED = ("amounts", "cup", "spilled", "spill_place", "tea", "mixed", "streams")
+    SAVED = ("amounts", "cup", "spilled", "puddles", "tea", "mixed", "streams")
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._vessel_bodies = {name: model.body(body_name(name)).id for name in VESSELS}
         self._spouts = {name: model.site(f"{name}/spout").id for name in VESSELS}
         self._cup = model.body(body_name("cup")).id
-        painted = [*(f"{name}/content" for name in VESSELS), "cup/content", "cup/sugar", "spill"]
+        painted = [*(f"{name}/content" for name in VESSELS), "cup/content", "cup/sugar"]
+        painted += [puddle_shape(name, lobe) for name in CONTENTS for lobe in range(len(LOBES))]
         self._painted = [model.geom(name).id for name in painted]
         self.reset()
 
     def reset(self) -> None:
         """Fill the vessels and empty the cup."""
         self.amounts = {name: vessel.filling for name, vessel in VESSELS.items()}
+        """Amount in every vessel [ml or g]."""
         self.cup = dict.fromkeys(CONTENTS, 0.0)
+        """Amount of every content in the cup [ml or g]."""
         self.spilled = dict.fromkeys(CONTENTS, 0.0)
-        self.spill_place = np.zeros(2)
+        """Amount of every content on the table [ml or g]."""
+        self.puddles = {content: np.zeros(2) for content in CONTENTS}
+        """Where every content was spilled, on the average (2,) [m]."""
         self.tea = 0.0
+        """Strength of the tea, 0 to 1."""
         self.mixed = 0.0
+        """How well the content of the cup is mixed, 0 to 1."""
         self.streams: tuple[Stream, ...] = ()
+        """Streams in the air now."""
 
     @property
     def depth(self) -> float:
@@ -121,7 +170,7 @@ class Liquids(Saved):
 
     def update(self, data: mujoco.MjData, dt: float, *, brewing: bool, stirring: bool) -> None:
         """Let everything flow, brew and mix for `dt` seconds."""
-        # What stands upright is not so full that it would run out.
+        # An upright vessel is never so full that it overflows.
         lean = data.xmat[:, 8]
         tilted = [name for name, body in self._vessel_bodies.items() if lean[body] <= _UPRIGHT]
         streams = [self._pour(name, data, dt) for name in tilted]
@@ -144,13 +193,15 @@ class Liquids(Saved):
         over_spout = -rotation[2, 0] > abs(rotation[2, 1])
         if over_spout and self._caught(spout, data):
             self.cup[vessel.content] += amount
-            end = np.array([*spout[:2], data.xpos[self._cup][2] + CUP_FLOOR + self.depth])
+            end = np.array([*spout[:2], data.xpos[self._cup][2] + CUP_BASE + self.depth])
         else:
             self.spilled[vessel.content] += amount
-            self.spill_place = spout[:2].copy()
+            share = amount / self.spilled[vessel.content]
+            puddle = self.puddles[vessel.content]
+            self.puddles[vessel.content] = puddle + share * (spout[:2] - puddle)
             end = np.array([*spout[:2], 0.0])
         if amount < 0.02 * FLOW_LIMIT * dt:
-            return None  # the last drops are not worth drawing
+            return None  # the last drops are too few to be seen
         return Stream(spout, end, _STREAMS[vessel.content])
 
     def _caught(self, spout: np.ndarray, data: mujoco.MjData) -> bool:
@@ -160,12 +211,12 @@ class Liquids(Saved):
 
     @property
     def colour(self) -> np.ndarray:
-        """Colour of what is in the cup (3,)."""
+        """Colour of the liquid in the cup (3,)."""
         water, tea, milk = (np.array(_COLOURS[name]) for name in ("water", "tea", "milk"))
         brewed = water + (tea - water) * self.tea
         total = self.cup["water"] + self.cup["milk"]
         share = self.cup["milk"] / total if total > 0 else 0.0
-        # Unstirred milk floats: one sees more of it than there is.
+        # Unstirred milk floats and is seen more than its share.
         whiteness = np.clip(share * (2.2 - self.mixed), 0, 1)
         return np.asarray(brewed + (milk - brewed) * whiteness)
 
@@ -177,30 +228,30 @@ class Liquids(Saved):
             content.pos[2] = 0.0035 + level
             content.rgba[3] = 1.0 if self.amounts[name] > 1 else 0.0
         self._paint_cup(model)
-        self._paint_spill(model)
-        # Where a shape is in the world is otherwise only found out by the next physics step.
+        for name in CONTENTS:
+            self._paint_puddle(model, name)
+        # The places of shapes in the world would otherwise be updated by the next physics step.
         for geom in self._painted:
             body = model.geom_bodyid[geom]
             offset = data.xmat[body].reshape(3, 3) @ model.geom_pos[geom]
             data.geom_xpos[geom] = data.xpos[body] + offset
 
-    def _paint_spill(self, model: mujoco.MjModel) -> None:
-        spill = model.geom("spill")
-        amounts = np.array(list(self.spilled.values()))
-        amount = amounts.sum()
-        thickness = 0.001 + 0.004 * self.spilled["sugar"] / max(amount, 1.0)  # sugar heaps up
-        spill.pos[:2] = self.spill_place
-        spill.size[0] = np.sqrt(max(amount, 0.01) * 1e-6 / (np.pi * thickness))
-        colours = np.array([_PUDDLES[content] for content in self.spilled])
-        spill.rgba[:3] = amounts @ colours / max(amount, 0.01)
-        spill.rgba[3] = 0.85 if amount > 1 else 0.0
+    def _paint_puddle(self, model: mujoco.MjModel, content: str) -> None:
+        """Draw a content's puddle, or heap, with the volume that was spilled."""
+        amount = self.spilled[content]
+        radius, height = puddle_size(content, amount)
+        for number, (x, y, share) in enumerate(LOBES):
+            shape = model.geom(puddle_shape(content, number))
+            shape.pos[:2] = self.puddles[content] + radius * np.array([x, y])
+            shape.size[:] = (share * radius, share * radius, share * height)
+            shape.rgba[:] = (*_PUDDLES[content], 1.0 if amount > 1 else 0.0)
 
     def _paint_cup(self, model: mujoco.MjModel) -> None:
         content, sugar = model.geom("cup/content"), model.geom("cup/sugar")
-        content.pos[2] = CUP_FLOOR + self.depth
+        content.pos[2] = CUP_BASE + self.depth
         content.rgba[:3] = self.colour
         content.rgba[3] = 1.0 if self.depth > 0.0005 else 0.0
         heap = self.cup["sugar"] * (1 - self.mixed)
         sugar.size[0] = 0.012 + 0.020 * min(heap / 25.0, 1.0)
-        sugar.pos[2] = CUP_FLOOR + 0.002
+        sugar.pos[2] = CUP_BASE + 0.002
         sugar.rgba[3] = 1.0 if heap > 1 else 0.0

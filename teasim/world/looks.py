@@ -1,6 +1,6 @@
-"""How the station looks in one demonstration: light, colours, cloth, cameras, things around it.
+"""How the station looks in one demonstration: light, colours, cloth, cameras, distractors.
 
-Nothing here is physics: two looks of one demonstration have the same states, bit for bit.
+Nothing here is physics: a demonstration has the same states, bit for bit, in every look.
 """
 
 from dataclasses import dataclass
@@ -16,27 +16,27 @@ Colour = tuple[float, float, float]
 """Red, green and blue, 0 to 1."""
 
 LOOKS = ("fixed", "random")
-"""How the pictures of several demonstrations vary."""
+"""How looks vary between demonstrations: not at all, or at random."""
 LIGHT_BRIGHTNESS = (0.6, 1.1)
-"""The lamp shines this many times as brightly as in the fixed look."""
+"""Range of the factor on the lamp's brightness in the fixed look."""
 LIGHT_AMBIENT = (0.75, 1.05)
-"""So does the light that comes from everywhere."""
+"""Range of the factor on the ambient light in the fixed look."""
 LIGHT_TINGE = 0.08
-"""A channel of the lamp differs at most by this share: warm or cold light."""
+"""Largest relative change of a colour channel of the lamp: warm or cold light."""
 LIGHT_LEAN = np.radians(12)
-"""The lamp stands at most this much higher or lower; it turns freely about the vertical [rad]."""
+"""Largest change of the lamp's elevation; it turns freely about the vertical [rad]."""
 SHADE = (0.88, 1.1)
-"""A table's, cloth's, floor's or wall's colour is multiplied by a factor in this range."""
+"""Range of the factor on the colour of a table, a cloth, the ground or the walls."""
 TINT = (0.75, 1.2)
-"""Every channel of a thing's colour is multiplied by a factor in this range."""
+"""Range of the factor on each colour channel of a thing."""
 CAMERA_OFFSET = 0.02
-"""A camera is moved at most this far along each axis [m]."""
+"""Largest shift of a camera along each axis [m]."""
 CAMERA_TURN = np.radians(2)
-"""A camera is turned at most this far about each axis [rad]."""
+"""Largest turn of a camera about each axis [rad]."""
 CAMERA_ZOOM = (0.96, 1.04)
-"""A camera's field of view is multiplied by a factor in this range."""
+"""Range of the factor on a camera's field of view."""
 MOST_DISTRACTORS = 3
-"""At most this many things stand around that have no use."""
+"""Largest number of distractors."""
 
 TABLES: tuple[Colour, ...] = (
     (0.64, 0.53, 0.42),
@@ -46,6 +46,7 @@ TABLES: tuple[Colour, ...] = (
     (0.72, 0.71, 0.68),
     (0.35, 0.38, 0.42),
 )
+"""Colours of tables."""
 CLOTHS: tuple[tuple[Colour, Colour], ...] = (
     ((0.72, 0.69, 0.64), (0.58, 0.32, 0.30)),
     ((0.70, 0.72, 0.74), (0.38, 0.46, 0.60)),
@@ -53,47 +54,51 @@ CLOTHS: tuple[tuple[Colour, Colour], ...] = (
     ((0.42, 0.44, 0.48), (0.58, 0.60, 0.62)),
 )
 """Colours of cloths and of their stripes."""
-FLOORS: tuple[Colour, ...] = ((0.50, 0.51, 0.53), (0.46, 0.40, 0.34), (0.62, 0.61, 0.58))
+GROUNDS: tuple[Colour, ...] = ((0.50, 0.51, 0.53), (0.46, 0.40, 0.34), (0.62, 0.61, 0.58))
+"""Colours of the ground."""
 WALLS: tuple[Colour, ...] = ((0.70, 0.70, 0.68), (0.58, 0.64, 0.70), (0.68, 0.62, 0.52))
+"""Colours of walls."""
 PATTERNS = ("plain", "stripes", "check")
+"""Patterns of cloths."""
 TINTED = ("kettle", "cup", "milk_jug", "sugar_pot", "tea_bag_holder", "spoon_holder")
 """Things whose colour may change."""
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A thing without a use."""
+class Extent:
+    """Size of a distractor."""
 
     radius: float
-    """It stays within this distance of its place [m]."""
+    """Largest distance of a point of it from its place, on the table [m]."""
     height: float
     """Height [m]."""
 
 
 @dataclass(frozen=True)
 class Zone:
-    """Part of the table where neither arm nor anything carried passes."""
+    """Part of the table over which neither arm nor anything carried passes."""
 
     x: tuple[float, float]
     """From and to, towards the front of the robot [m]."""
     y: tuple[float, float]
     """From and to, towards the robot's left [m]."""
     clearance: float
-    """Things that stand here are at most this high, or they would hide what is done [m]."""
+    """Largest height of a distractor here: a higher one would hide the task [m]."""
 
-    def room(self, kind: Kind) -> bool:
-        """Whether the thing fits."""
+    def fits(self, extent: Extent) -> bool:
+        """Whether a distractor of this size fits in."""
         width = min(self.x[1] - self.x[0], self.y[1] - self.y[0])
-        return kind.height <= self.clearance and 2 * kind.radius <= width
+        return extent.height <= self.clearance and 2 * extent.radius <= width
 
 
 DISTRACTORS = {
-    "plate": Kind(0.055, 0.011),
-    "bottle": Kind(0.031, 0.185),
-    "book": Kind(0.059, 0.022),
-    "plant": Kind(0.041, 0.130),
-    "box": Kind(0.049, 0.071),
+    "plate": Extent(0.055, 0.011),
+    "bottle": Extent(0.031, 0.185),
+    "book": Extent(0.059, 0.022),
+    "plant": Extent(0.041, 0.130),
+    "box": Extent(0.049, 0.071),
 }
+"""Sizes of all distractors by name."""
 ZONES = (
     Zone((0.62, 0.74), (0.24, 0.60), 0.03),
     Zone((0.60, 0.74), (-0.60, -0.14), 0.19),
@@ -115,12 +120,12 @@ def _check_name(what: str, name: str, names: tuple[str, ...]) -> None:
 
 @dataclass(frozen=True)
 class Light:
-    """The lamp and the light from everywhere."""
+    """The lamp and the ambient light."""
 
     brightness: float = 1.0
     """Factor on the lamp."""
     ambient: float = 1.0
-    """Factor on the light from everywhere."""
+    """Factor on the ambient light."""
     colour: Colour = (1.0, 1.0, 1.0)
     """Factor on each channel of the lamp."""
     turn: float = 0.0
@@ -161,14 +166,14 @@ class Tint:
 
 @dataclass(frozen=True)
 class CameraShift:
-    """A camera that stands a little elsewhere."""
+    """A small displacement of a camera."""
 
     camera: str
     """One of `CAMERAS`."""
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Moved by this much, in the world's axes [m]."""
+    """Shift along the world's axes [m]."""
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Turned by this much, as a rotation vector in the camera's own axes [rad]."""
+    """Turn, as a rotation vector in the camera's own axes [rad]."""
     zoom: float = 1.0
     """Factor on its field of view."""
 
@@ -178,7 +183,7 @@ class CameraShift:
 
 @dataclass(frozen=True)
 class Distractor:
-    """A thing without a use that stands in the picture; nothing can touch it."""
+    """A thing in the picture that the task does not need; nothing can touch it."""
 
     name: str
     """One of `DISTRACTORS`."""
@@ -189,7 +194,7 @@ class Distractor:
     yaw: float = 0.0
     """Turn about the vertical [rad]."""
     colour: Colour | None = None
-    """Colour of its main part; None leaves it its own."""
+    """Colour of its main part; None keeps its own colour."""
 
     def __post_init__(self) -> None:
         _check_name("distractor", self.name, tuple(DISTRACTORS))
@@ -200,28 +205,28 @@ class Distractor:
 class Look:
     """Everything about the pictures of a demonstration that is not physics.
 
-    Without arguments it is the station as `scene.xml` has it.
+    The defaults are the station as defined in `scene.xml`.
     """
 
     light: Light = Light()
     """The light."""
     table: Colour | None = None
-    """Colour of the table; None is that of the scene, as for those below."""
+    """Colour of the table; None keeps the colour of the scene, as in the fields below."""
     cloth: Cloth | None = None
-    """Cloth on the table; None is none."""
-    floor: Colour | None = None
-    """Colour of the floor."""
+    """Cloth on the table; None for a bare table."""
+    ground: Colour | None = None
+    """Colour of the ground."""
     wall: Colour | None = None
-    """Colour of the walls; None is no walls, but the sky."""
+    """Colour of the walls; None for no walls, only sky."""
     tints: tuple[Tint, ...] = ()
-    """Things of another colour."""
+    """Changed colours of things."""
     cameras: tuple[CameraShift, ...] = ()
-    """Cameras that stand elsewhere."""
+    """Displaced cameras."""
     distractors: tuple[Distractor, ...] = ()
-    """Things that stand around, each at most once."""
+    """Distractors, each at most once."""
 
     def __post_init__(self) -> None:
-        for what in ("table", "floor", "wall"):
+        for what in ("table", "ground", "wall"):
             _check_colour(what, getattr(self, what))
         named = {
             "tint": [tint.name for tint in self.tints],
@@ -236,7 +241,7 @@ class Look:
 
 @cache
 def fixed_look() -> Look:
-    """Return the look of the scene as it is."""
+    """Return the look of the scene as defined."""
     return Look()
 
 
@@ -266,7 +271,7 @@ def sample_look(rng: np.random.Generator) -> Look:
         light=_sample_light(rng),
         table=_shade(rng, _one_of(rng, TABLES)),
         cloth=_sample_cloth(rng),
-        floor=_shade(rng, _one_of(rng, FLOORS)),
+        ground=_shade(rng, _one_of(rng, GROUNDS)),
         wall=_shade(rng, _one_of(rng, WALLS)) if rng.random() < 0.7 else None,
         tints=tuple(Tint(name, _triple(rng, *TINT)) for name in TINTED),
         cameras=tuple(_sample_shift(rng, camera) for camera in CAMERAS),
@@ -285,7 +290,7 @@ def _sample_light(rng: np.random.Generator) -> Light:
 
 
 def _sample_cloth(rng: np.random.Generator) -> Cloth | None:
-    """Half the tables are bare."""
+    """Draw a cloth for half of the tables."""
     if rng.random() < 0.5:
         return None
     colour, stripe = CLOTHS[rng.integers(len(CLOTHS))]
@@ -303,7 +308,7 @@ def _sample_shift(rng: np.random.Generator, camera: str) -> CameraShift:
 
 
 def _sample_distractors(rng: np.random.Generator) -> tuple[Distractor, ...]:
-    """Things where there is room; one that would stand in another is left out."""
+    """Draw distractors in the zones they fit in; one that would overlap another is left out."""
     wanted = rng.permutation(tuple(DISTRACTORS))[: rng.integers(MOST_DISTRACTORS + 1)]
     placed: list[Distractor] = []
     for name in map(str, wanted):
@@ -314,10 +319,10 @@ def _sample_distractors(rng: np.random.Generator) -> tuple[Distractor, ...]:
 
 
 def _sample_distractor(rng: np.random.Generator, name: str) -> Distractor:
-    kind = DISTRACTORS[name]
-    zones = [zone for zone in ZONES if zone.room(kind)]
+    extent = DISTRACTORS[name]
+    zones = [zone for zone in ZONES if zone.fits(extent)]
     zone = zones[rng.integers(len(zones))]
-    x, y = (float(rng.uniform(a + kind.radius, b - kind.radius)) for a, b in (zone.x, zone.y))
+    x, y = (float(rng.uniform(a + extent.radius, b - extent.radius)) for a, b in (zone.x, zone.y))
     return Distractor(name, x, y, float(rng.uniform(-np.pi, np.pi)), _triple(rng, 0.2, 0.7))
 
 

@@ -3,9 +3,10 @@
 import mujoco
 import numpy as np
 
+from teasim.task.subtasks import ROWS
 from teasim.world.monitor import roles
 
-SEGMENT_NAMES = (
+_STATION = (
     "background",
     "right_arm",
     "left_arm",
@@ -20,12 +21,14 @@ SEGMENT_NAMES = (
     "hob",
     "knob",
     "table",
-    "floor",
+    "ground",
     "distractor",
     "stream",
 )
-"""Names of the segments; the index is the number in a mask. Sky and walls are background, what is
-in a vessel belongs to the vessel, and what was spilled to the stream."""
+
+SEGMENT_NAMES = tuple(dict.fromkeys((*_STATION, *(row.segment for row in ROWS))))
+"""Names of the segments; the index is the number in a mask. Sky and walls are background, the
+content of a vessel belongs to the vessel, and what was spilled to the stream."""
 
 _PARTS = {
     "right_fingers": "right_arm",
@@ -41,12 +44,12 @@ _PARTS = {
 
 
 def segments(model: mujoco.MjModel) -> np.ndarray:
-    """Number in `SEGMENT_NAMES` of every shape (ngeom,) int32."""
+    """Return the number in `SEGMENT_NAMES` of every shape (ngeom,) int32."""
     return np.array([SEGMENT_NAMES.index(_segment(role)) for role in roles(model)], np.int32)
 
 
 def _segment(role: str) -> str:
     if role in SEGMENT_NAMES:
         return role
-    # What is no thing of the station is the body of whoever makes the tea.
+    # Everything else belongs to the body of the demonstrator.
     return _PARTS.get(role, _PARTS.get(role.partition("_")[0], "torso"))

@@ -12,7 +12,8 @@ SOURCE = '''
 
 import sys
 
-from teasim.common.errors import PoolError
+from teasim.common.cli import resumable
+from teasim.common.errors import Interrupted, PoolError
 
 
 def echo(arguments):
@@ -48,6 +49,17 @@ def interrupted(arguments):
     raise KeyboardInterrupt
 
 
+@resumable
+def interrupted_halfway(arguments):
+    """Be interrupted when half of the work is kept."""
+    raise KeyboardInterrupt
+
+
+def interrupted_with_words(arguments):
+    """Be interrupted and know what is kept."""
+    raise Interrupted("Interrupted; 3 of 7 runs are kept in 'out'.")
+
+
 def leave(arguments):
     """Leave as an argument parser does."""
     sys.exit(int(arguments[0]) if arguments else None)
@@ -65,6 +77,8 @@ VERBS = {
     "bug": "bug",
     "missing-file": "missing_file",
     "interrupted": "interrupted",
+    "halfway": "interrupted_halfway",
+    "stop-with-words": "interrupted_with_words",
     "leave": "leave",
     "leave-with-words": "leave_with_words",
 }

@@ -84,7 +84,7 @@ def test_without_video_the_code_is_1_and_the_text_ends_with_the_fix(machine, cap
     assert doctor.main([]) == 1
     out = capsys.readouterr().out
     assert "--  h264    OSError: no ffmpeg" in out
-    assert out.splitlines()[-1].startswith("To mend it, run: pip install ")
+    assert out.splitlines()[-1].startswith("To fix it, run: pip install ")
 
 
 def test_a_codec_that_is_not_read_is_told_with_the_fix(machine, capsys):
@@ -119,7 +119,7 @@ def test_the_text_of_a_healthy_machine(machine, capsys):
     out = capsys.readouterr().out
     assert "ok  egl     2.5 ms per 224x224 frame  (in use)" in out
     assert "--  osmesa  libOSMesa.so.8 is missing" in out
-    assert out.splitlines()[-1] == "All well: rendering and video work."
+    assert out.splitlines()[-1] == "Rendering and video work."
 
 
 def test_video_really_goes_there_and_back():
@@ -132,7 +132,7 @@ def test_a_codec_that_loses_frames_is_found(monkeypatch):
     decode = doctor._decode
     monkeypatch.setattr(doctor, "_decode", lambda path: decode(path)[:-1])
     result = doctor.probe_video()
-    assert (result.ok, result.problem) == (False, "49 of 50 frames came back")
+    assert (result.ok, result.problem) == (False, "49 of 50 frames were read back")
 
 
 def test_a_codec_that_swaps_colours_is_found(monkeypatch):

@@ -65,10 +65,24 @@ def test_leaving_like_an_argument_parser(argument, code):
             "teasim: internal error, IndexError: list index out of range; "
             "run again with --debug to see where.\n",
         ),
-        ("interrupted", 130, ""),
+        (
+            "interrupted",
+            130,
+            "teasim: Interrupted; run the same command again to start over.\n",
+        ),
+        (
+            "halfway",
+            130,
+            "teasim: Interrupted; run the same command again to continue.\n",
+        ),
+        (
+            "stop-with-words",
+            130,
+            "teasim: Interrupted; 3 of 7 runs are kept in 'out'.\n",
+        ),
     ],
 )
-def test_failing_gives_a_code_and_at_most_one_sentence(verb, code, sentence, capsys):
+def test_failing_gives_a_code_and_one_sentence(verb, code, sentence, capsys):
     assert main([verb]) == code
     captured = capsys.readouterr()
     assert captured.err == sentence
@@ -96,6 +110,48 @@ def test_an_unknown_verb_is_named_with_the_choices(capsys):
     )
     assert error.count("\n") == 1
     assert "doctor" in error
+
+
+@pytest.mark.parametrize(
+    ("mistyped", "meant"), [("doctr", "doctor"), ("filters", "filter"), ("Train", "train")]
+)
+def test_a_mistyped_verb_is_guessed(mistyped, meant, capsys):
+    assert main([mistyped]) == 2
+    start = f"teasim: unknown verb '{mistyped}'; did you mean '{meant}'? choose ablate, "
+    assert capsys.readouterr().err.startswith(start)
+
+
+def completions(shell: str, word: str, script: str) -> list[str]:
+    """What bash offers for `teasim WORD<TAB>` after reading the script."""
+    program = f"""{script}
+COMP_WORDS=(teasim {word}) COMP_CWORD=1
+compgen $(complete -p teasim | sed "s/^complete//; s/ teasim$//; s/'[^']*'//; s/-W//") \\
+    -W "$(complete -p teasim | sed "s/.*-W '//; s/'.*//")" -- {word}"""
+    return subprocess.check_output([shell, "-c", program], text=True).split()
+
+
+def test_bash_completes_verbs(capsys, tmp_path):
+    assert main(["--completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    assert completions("bash", "doc", script) == ["doctor"]
+    assert set(completions("bash", "in", script)) >= {"inspect", "interrupted"}
+
+
+def test_zsh_gets_the_same_words_after_its_bash_completion_is_loaded(capsys):
+    main(["--completion", "bash"])
+    bash = capsys.readouterr().out
+    assert main(["--completion", "zsh"]) == 0
+    zsh = capsys.readouterr().out
+    assert zsh.splitlines()[:3] == ["autoload -U compinit bashcompinit", "compinit", "bashcompinit"]
+    assert zsh.splitlines()[3:] == bash.splitlines()
+
+
+@pytest.mark.parametrize("words", [[], ["powershell"], ["bash", "zsh"]])
+def test_completion_names_the_shells(words, capsys):
+    assert main(["--completion", *words]) == 2
+    assert capsys.readouterr().err == (
+        "teasim: --completion takes the name of a shell: choose bash or zsh.\n"
+    )
 
 
 def test_a_reader_that_went_away_is_no_error():

@@ -27,9 +27,13 @@ sys.exit(code)
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the dispatcher in a process of its own, which then tells what it loaded."""
+    """Run the dispatcher in a process of its own, which then tells what it loaded.
+
+    Its output is no terminal and no width is given, as where it is piped into a file.
+    """
     command = [sys.executable, "-c", PROGRAM, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"}
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment)
 
 
 def test_the_installed_verbs_are_those_of_the_project():
@@ -45,6 +49,23 @@ def test_help_tells_usage_and_purpose_quickly(verb):
     assert usage.startswith(f"usage: teasim {verb}")
     assert purpose.strip().endswith(".")
     assert done.stdout.endswith("loaded:\n"), "--help loads a heavy package"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_fits_a_terminal_and_ends_with_two_examples(verb):
+    lines = run(verb, "--help").stdout.splitlines()[:-1]
+    assert [line for line in lines if len(line) > 80] == []
+    assert "examples:" in lines
+    examples = lines[lines.index("examples:") + 1 :]
+    assert len(examples) >= 2
+    assert all(example.startswith(f"  teasim {verb}") for example in examples)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_options_are_completed_by_the_shell(verb):
+    script = run(verb, "--tyro-print-completion", "bash").stdout
+    assert f"# Bash completion for teasim {verb}" in script
+    assert "examples:" not in script
 
 
 @pytest.mark.parametrize("verb", VERBS)

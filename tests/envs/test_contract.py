@@ -11,6 +11,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 from teasim.common.errors import ConfigError
 from teasim.constants import CAMERAS, SUBTASKS
+from teasim.task.scoring import judge
 from tests.envs.fingerprint import fingerprint
 
 ROOT = Path(__file__).parents[2]
@@ -131,8 +132,21 @@ def test_there_is_no_picture_without_a_render_mode(make, name):
 
 
 @pytest.mark.parametrize("start", ["import teasim", "import gymnasium, teasim", ""])
-def test_the_environments_are_found_however_teasim_was_imported(start):
-    program = f"{start}\nimport gymnasium\ngymnasium.make('teasim:teasim/TeaMaking-v0')"
+@pytest.mark.parametrize("prefix", ["teasim:", ""])
+def test_the_environments_are_found_however_teasim_was_imported(start, prefix):
+    if not start and not prefix:
+        return  # nothing says that teasim is meant
+    program = f"""
+import sys
+{start}
+assert "gymnasium" in sys.modules or not {{"numpy", "mujoco"}} & set(sys.modules)
+import gymnasium
+assert gymnasium.make("{prefix}teasim/TeaMaking-v0").spec.max_episode_steps == 1800
+hooks = [type(finder).__module__ for finder in sys.meta_path]
+assert "teasim" not in hooks, hooks
+assert type(gymnasium.__spec__.loader) is type(gymnasium.spaces.__spec__.loader)
+assert gymnasium.__loader__ is gymnasium.__spec__.loader
+"""
     subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=True)
 
 
@@ -171,3 +185,17 @@ def test_every_camera_is_named_once(make, name, cameras):
     with pytest.raises(ConfigError) as error:
         make(name, obs_type="pixels", cameras=cameras)
     assert str(error.value) == sentence
+
+
+@each_env
+def test_every_violation_has_words_and_a_kind(make, name):
+    metadata = make(name).metadata
+    words, kinds = metadata["violations"], metadata["violation_kinds"]
+    assert words["unsafe"] == "oven left on"
+    assert words["spilled_water"] == "water spilled"
+    assert words["add_water_before_turn_off_oven"] == "add_water before turn_off_oven"
+    assert sorted(key for keys in kinds.values() for key in keys) == sorted(words)
+    assert list(kinds) == ["oven left on", "spilled", "out of order"]
+    breaks = judge(SUBTASKS[::-1], oven_on=True, spilled={"sugar": 9.0}).violations
+    assert breaks
+    assert set(breaks) <= set(words)

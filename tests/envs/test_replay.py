@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from teasim.envs.actions import DELTA_SHARE
-from teasim.generate import demo_rng
+from teasim.generation import demo_rng
 from teasim.rollout import demonstrate, replay
 from teasim.skills.arm import SPEED_MARGIN
 from teasim.task.mistakes import Plan

@@ -1,3 +1,4 @@
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,7 @@ import pytest
 from teasim.cli.inspect import main
 from teasim.common.errors import PoolError
 from teasim.pool import Pool
-from tests.toy_pool import copy_pool, strip_ground_truth
+from tests.toy_pool import SEQ_1, SEQ_2, copy_pool, make_toy_pool, strip_ground_truth
 
 
 def test_a_sound_pool_is_shown_in_full(toy_pool: Pool, capsys: pytest.CaptureFixture[str]) -> None:
@@ -20,12 +21,88 @@ def test_a_sound_pool_is_shown_in_full(toy_pool: Pool, capsys: pytest.CaptureFix
             f"{episode.length / 10:.1f}",
             f"seq_{episode.index + 1}",
         ]
-    assert "no       skip turn_off_oven  p3" in lines[3]
-    facts = dict(line.split(":", 1) for line in lines[5:])
+    assert lines[1].split()[4:] == ["yes", "p1", "0", "4", "2", "3", "6", "1", "5"]
+    assert lines[4] == "   mistakes: skip turn_off_oven"
+    facts = dict(line.split(":", 1) for line in lines[6:] if ":" in line)
     assert facts["Cameras"].strip() == "left, cup"
-    assert facts["Frames per second"].strip() == "10"
+    assert facts["Frame rate"].strip() == "10 per second"
     assert facts["Content hash"].strip() == toy_pool.content_hash()
     assert facts["Integrity"].strip() == "sound"
+
+
+def test_the_text_fits_80_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    many = [*SEQ_1, *SEQ_1[:5], *SEQ_2, *SEQ_1[1:], *SEQ_2[::-1]]
+    make_toy_pool(tmp_path / "p", [many, SEQ_2, SEQ_1[3:]], size=16, frames_per_subtask=2)
+    assert main([str(tmp_path / "p")]) == 0
+    out = capsys.readouterr().out.replace(str(tmp_path), "")
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_json_has_facts_demonstrations_and_problems(
+    toy_pool: Pool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(toy_pool.root), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["source"] == str(toy_pool.root)
+    assert told["format"] == "LeRobot data set"
+    assert told["problems"] == []
+    assert told["content_hash"] == toy_pool.content_hash()
+    assert told["subtasks"] == list(toy_pool.subtasks)
+    last = told["demonstrations"][2]
+    assert last["demo_id"] == toy_pool.episodes[2].demo_id
+    assert last["correct"] is False
+    assert [mistake["subtask"] for mistake in last["mistakes"]] == ["turn_off_oven"]
+    spans = [(s["subtask"], s["start"], s["stop"]) for s in last["segments"]]
+    assert spans == [(s.subtask, s.start, s.stop) for s in toy_pool.episodes[2].spans()]
+
+
+def test_json_of_a_damaged_pool_has_its_problems(
+    toy_pool: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = copy_pool(toy_pool, tmp_path / "copy")
+    (root / "meta/info.json").write_text("{")
+    assert main([str(root), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["problems"] == [
+        f"The file '{root}/meta/info.json' is damaged: it is no readable JSON."
+    ]
+    assert "demonstrations" not in told
+
+
+def test_a_source_of_another_format_is_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "groundTruth").mkdir()
+    (tmp_path / "mapping.txt").write_text("0 cut\n1 mix\n")
+    (tmp_path / "groundTruth" / "salad.txt").write_text("cut\ncut\nmix\n")
+    assert main([str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == [
+        "#",
+        "demo_id",
+        "frames",
+        "sequence",
+        "correct",
+        "participant",
+        "sub-tasks",
+    ]
+    assert lines[1].split() == ["0", "salad", "3", "-", "-", "-", "0", "1"]
+    assert "Format:         MS-TCN folder" in lines
+    assert "Sub-tasks:      0=cut, 1=mix" in lines
+    assert main([str(tmp_path), "--fps", "2"]) == 0
+    assert capsys.readouterr().out.splitlines()[1].split()[2] == "1.5"
+
+
+def test_leakage_is_shown_as_text_and_as_json(
+    toy_pool: Pool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(toy_pool.root), "--leakage"]) == 0
+    text = capsys.readouterr().out
+    assert main([str(toy_pool.root), "--leakage", "--json"]) == 0
+    clues = json.loads(capsys.readouterr().out)["leakage"]
+    assert clues
+    for name, value in clues.items():
+        assert f"  {name:20}{value:.2f}" in text
 
 
 def test_what_is_not_known_is_a_hyphen(
@@ -34,7 +111,7 @@ def test_what_is_not_known_is_a_hyphen(
     stripped = strip_ground_truth(copy_pool(toy_pool, tmp_path / "copy"))
     assert main([str(stripped.root)]) == 0
     cells = capsys.readouterr().out.splitlines()[1].split()
-    assert cells[3:8] == ["-", "-", "-", "p1", "turn_on_oven"]
+    assert cells[3:7] == ["-", "-", "p1", "0"]
 
 
 def test_damage_is_told_and_exits_1(
@@ -46,7 +123,7 @@ def test_damage_is_told_and_exits_1(
     assert main([str(root)]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert f"The file '{video}' is damaged: its check sum is not the one of the manifest." in lines
-    assert lines[-1] == "Integrity: damaged, 2 problems"
+    assert lines[-1] == "Integrity:      damaged, 2 problems"
 
 
 def test_damaged_metadata_exit_1(
@@ -57,12 +134,12 @@ def test_damaged_metadata_exit_1(
     assert main([str(root)]) == 1
     assert capsys.readouterr().out.splitlines() == [
         f"The file '{root}/meta/info.json' is damaged: it is no readable JSON.",
-        "Integrity: damaged, 1 problem",
+        "Integrity:      damaged, 1 problem",
     ]
 
 
 def test_no_pool_at_all_is_bad_input(tmp_path: Path) -> None:
-    with pytest.raises(PoolError, match=r"^There is no pool at '.*': the folder is empty\.$"):
+    with pytest.raises(PoolError, match=r"^The folder '.*' is empty; a source is one of: "):
         main([str(tmp_path)])
 
 

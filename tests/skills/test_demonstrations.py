@@ -1,12 +1,13 @@
 """Whole demonstrations, from a random layout to a cup of tea."""
 
-from itertools import groupby
+from itertools import groupby, zip_longest
 
 import numpy as np
 import pytest
 
 from teasim.rollout import demonstrate, replay, run_subtask
-from teasim.skills.arm import Style
+from teasim.skills.library import perform
+from teasim.skills.style import Style
 from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1, SEQ_2
 from teasim.task.scoring import judge
@@ -70,3 +71,19 @@ def test_running_a_sub_task_tells_how_long_it_took():
     steps = run_subtask(simulation, "turn_on_oven", Style())
     assert simulation.data.time == pytest.approx(0.1 * steps)
     assert simulation.subtasks_done == ("turn_on_oven",)
+
+
+def test_two_demonstrations_at_once_do_not_steer_each_other():
+    def targets(subtask: str):
+        simulation = Simulation()
+        simulation.reset(nominal_layout())
+        for target in perform(subtask, simulation, Style()):
+            yield target.tobytes()
+            if simulation.data.time > 4:
+                return
+            simulation.step(target)
+
+    one, other = ("add_sugar", "add_milk")  # the same arm, at different postures
+    alone = list(targets(one)), list(targets(other))
+    together = zip(*zip_longest(targets(one), targets(other)), strict=True)
+    assert tuple([bits for bits in part if bits] for part in together) == alone

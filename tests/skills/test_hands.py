@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from teasim.common.errors import SkillError
 from teasim.constants import ARMS
 from teasim.rollout import run_subtask
-from teasim.skills.arm import Style
 from teasim.skills.geometry import DOWN, pose, position, rotation, tool, turn_angle
 from teasim.skills.ik import kinematics
+from teasim.skills.style import Style
+from teasim.task.subtasks import ROWS
 from teasim.world.embodiments import EMBODIMENTS, PERSON
 from teasim.world.monitor import Monitor
 from teasim.world.person import HAND_RANGE, HANDS_READY
@@ -68,7 +69,7 @@ def test_what_is_beyond_the_table_is_out_of_reach(arm):
 
 
 @pytest.mark.parametrize("hand", ARMS)
-@pytest.mark.parametrize("subtask", sorted(PERSON.either_hand))
+@pytest.mark.parametrize("subtask", [row.name for row in ROWS if row.either_hand])
 def test_people_use_the_hand_they_prefer(person, subtask, hand):
     if subtask == "stir":
         person.liquids.cup.update(water=100.0, milk=50.0)

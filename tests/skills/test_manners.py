@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from teasim.skills.arm import Style
 from teasim.skills.library import SKILLS, perform
+from teasim.skills.style import Style
 from teasim.task.mistakes import ABANDONED, INEFFECTIVE, MISSING_THE_CUP
 from teasim.task.scoring import spills
 from teasim.world.embodiments import EMBODIMENTS

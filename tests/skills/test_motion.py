@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from teasim.common.errors import SkillError
 from teasim.constants import ARMS, CONTROL_TIMESTEP
-from teasim.skills.arm import SPEED_MARGIN, Arm, Style
+from teasim.skills.arm import SPEED_MARGIN, Arm
 from teasim.skills.geometry import (
     DOWN,
     EASE_PEAK,
@@ -25,6 +25,7 @@ from teasim.skills.geometry import (
 )
 from teasim.skills.ik import ANGLE_TOLERANCE, POSITION_TOLERANCE, kinematics
 from teasim.skills.pour import KETTLE, MILK_JUG, SUGAR_POT, spout_offset
+from teasim.skills.style import Style
 from teasim.world.simulation import Simulation
 from teasim.world.station import nominal_layout
 from teasim.world.yumi import JOINT_SPEEDS, READY, SOFT_LIMITS

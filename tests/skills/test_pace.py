@@ -5,8 +5,8 @@ import pytest
 
 from teasim.constants import SUBTASKS
 from teasim.rollout import demonstrate
-from teasim.skills.arm import Style
 from teasim.skills.pace import STRETCH, TYPICAL_SECONDS, Pace, idle
+from teasim.skills.style import Style
 from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1
 from teasim.world.embodiments import EMBODIMENTS

@@ -8,9 +8,9 @@ import pytest
 from teasim.common.errors import ConfigError, SkillError
 from teasim.constants import ARMS, SUBTASKS
 from teasim.rollout import run_subtask
-from teasim.skills.arm import Style
 from teasim.skills.demonstrators import sample_style, varied
 from teasim.skills.library import SKILLS, perform
+from teasim.skills.style import Style
 from teasim.world.embodiments import EMBODIMENTS, Embodiment
 from teasim.world.liquids import VESSELS
 from teasim.world.monitor import PENETRATION_LIMIT, TCP_SPEED_LIMIT, Monitor

@@ -70,3 +70,15 @@ def test_every_exported_name_exists():
 def source(name: str) -> str:
     path = ROOT.joinpath(*name.split("."))
     return (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text()
+
+
+@pytest.mark.parametrize("first", ["", "import teasim.generation, teasim.pool; "])
+def test_teasims_entry_points_are_what_they_are_called(first):
+    program = f"{first}from teasim import Pool, generate; print(callable(generate), Pool.__name__)"
+    command = [sys.executable, "-c", program]
+    assert subprocess.check_output(command, cwd=ROOT, text=True) == "True Pool\n"
+
+
+def test_an_unknown_name_of_teasim_is_an_import_error():
+    with pytest.raises(ImportError, match="cannot import name 'generated'"):
+        exec("from teasim import generated")

@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 
 from teasim.common.errors import ConfigError
 from teasim.constants import SUBTASKS
-from teasim.task.mistakes import MISSING_THE_CUP, MISTAKES, Plan, mistake, skip, spoil
+from teasim.task.mistakes import (
+    MISSING_THE_CUP,
+    MISTAKES,
+    Plan,
+    PlannedMistake,
+    mistake,
+    skip,
+    spoil,
+)
 from teasim.task.recipes import (
     CRITICAL,
     POURED,
@@ -155,7 +163,7 @@ def test_a_fourth_skip_is_refused():
     with pytest.raises(ConfigError) as error:
         skip(plan, rng(0))
     assert str(error.value) == (
-        "The mistake 'skip' finds nothing left to spoil in a plan of turn_on_oven, add_sugar, "
+        "The mistake 'skip' finds no step left to change in a plan of turn_on_oven, add_sugar, "
         "add_milk, stir; ask for fewer mistakes in one demonstration."
     )
 
@@ -179,3 +187,34 @@ def test_skipping_what_does_not_exist_is_refused_by_name():
     without_milk = Plan(tuple(name for name in SEQ_1 if name != "add_milk"))
     with pytest.raises(ConfigError, match="'skip' cannot be made at 'add_milk' in this plan"):
         mistake("skip")(without_milk, rng(0), "add_milk")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_step_without_effect_has_a_label_whatever_the_cause(seed):
+    plan = spoil(Plan(SEQ_1), "wrong_object@add_sugar", rng(seed))
+    taken = plan.steps[2]
+    later = plan.steps.index(taken, 3)
+    assert plan.labels == (
+        PlannedMistake("wrong_object", "add_sugar", 2),
+        PlannedMistake("ineffective", taken, later),
+    )
+    assert Plan(SEQ_1).labels == ()
+
+
+def test_what_a_skipped_step_makes_pointless_is_labelled():
+    plan = spoil(Plan(SEQ_1), "skip@turn_on_oven", rng(0))
+    assert plan.labels[1:] == (PlannedMistake("ineffective", "turn_off_oven", 3),)
+
+
+@given(
+    names=st.lists(st.sampled_from(sorted(MISTAKES)), min_size=1, max_size=3),
+    seed=st.integers(0, 99),
+)
+def test_every_step_is_an_event_or_labelled(names, seed):
+    try:
+        plan = spoil(Plan(SEQ_1), "+".join(names), rng(seed))
+    except ConfigError:
+        return
+    labelled = {label.position for label in plan.labels if label.name != "skip"}
+    assert len(plan.steps) - len(plan.outcome) <= len(labelled)
+    assert plan.labels[: len(plan.mistakes)] == plan.mistakes

@@ -12,12 +12,12 @@ from teasim.task.recipes import (
     SEQ_1,
     SEQ_2,
     allowed_next,
-    check_subtask,
     is_legal,
     next_correct,
     recognisable,
 )
 from teasim.task.scoring import judge
+from teasim.task.subtasks import find_subtask
 
 ORDERS = tuple(permutations(SUBTASKS))
 LEGAL = tuple(order for order in ORDERS if is_legal(order))
@@ -113,9 +113,9 @@ def test_stirring_too_early_has_to_be_done_again():
 
 
 def test_an_unknown_sub_task_is_named_with_the_choices():
-    assert check_subtask("stir") == "stir"
+    assert find_subtask("stir").name == "stir"
     with pytest.raises(ConfigError) as error:
-        check_subtask("sing")
+        find_subtask("sing")
     assert str(error.value) == f"Unknown sub-task 'sing'; choose {', '.join(SUBTASKS)}."
 
 

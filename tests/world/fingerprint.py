@@ -5,8 +5,8 @@ import hashlib
 import numpy as np
 
 from teasim.render import StationRenderer
-from teasim.skills.arm import Style
 from teasim.skills.library import perform
+from teasim.skills.style import Style
 from teasim.world.simulation import Simulation
 from teasim.world.station import sample_layout
 

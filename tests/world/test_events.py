@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from teasim.constants import GRIPPER_SQUEEZE, STATE_NAMES
-from teasim.world.liquids import CUP_FLOOR, VESSELS
+from teasim.world.liquids import CUP_BASE, VESSELS
 from teasim.world.station import body_name
 
 LEFT_HAND = STATE_NAMES.index("left_gripper")
@@ -101,6 +101,11 @@ def test_a_bag_still_held_is_not_added(simulation):
     assert not simulation.recogniser.bag_in_cup
 
 
+def counted(simulation, water: float) -> None:
+    """Let the water in the cup be an event that has been recorded before."""
+    simulation.recogniser._watchers["add_water"]._counted = water
+
+
 def stir(simulation, turns: float, *, depth: float, radius: float = 0.015) -> None:
     """Move the tip of the spoon around in the cup by hand."""
     for angle in np.arange(0, 2 * np.pi * turns, 0.2):
@@ -113,20 +118,20 @@ def stir(simulation, turns: float, *, depth: float, radius: float = 0.015) -> No
 @pytest.mark.parametrize("direction", [1, -1])
 def test_two_turns_in_the_liquid_are_stirring(simulation, direction):
     simulation.liquids.cup["water"] = 50.0
-    simulation.recogniser._counted["water"] = 50.0
-    stir(simulation, 1.8, depth=CUP_FLOOR + 0.003, radius=direction * 0.015)
+    counted(simulation, 50.0)
+    stir(simulation, 1.8, depth=CUP_BASE + 0.003, radius=direction * 0.015)
     assert simulation.events == ()
-    stir(simulation, 2.3, depth=CUP_FLOOR + 0.003)
+    stir(simulation, 2.3, depth=CUP_BASE + 0.003)
     assert simulation.subtasks_done == ("stir",)
 
 
 @pytest.mark.parametrize(
     ("water", "depth", "radius"),
-    [(0.0, CUP_FLOOR + 0.003, 0.015), (50.0, 0.05, 0.015), (50.0, CUP_FLOOR + 0.003, 0.06)],
+    [(0.0, CUP_BASE + 0.003, 0.015), (50.0, 0.05, 0.015), (50.0, CUP_BASE + 0.003, 0.06)],
     ids=["empty", "above the liquid", "beside the cup"],
 )
 def test_turns_elsewhere_are_not(simulation, water, depth, radius):
     simulation.liquids.cup["water"] = water
-    simulation.recogniser._counted["water"] = water
+    counted(simulation, water)
     stir(simulation, 4, depth=depth, radius=radius)
     assert simulation.events == ()

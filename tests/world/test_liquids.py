@@ -123,7 +123,7 @@ def test_elsewhere_it_is_spilled(table, name, offset, axis):
     table.flow(5.0)
     assert table.liquids.cup[content] == 0
     assert table.liquids.spilled[content] == pytest.approx(filling, abs=0.01)
-    assert table.liquids.spill_place == pytest.approx(spout[:2])
+    assert table.liquids.puddles[content] == pytest.approx(spout[:2])
 
 
 def test_a_cup_that_lies_catches_nothing(table):
@@ -184,13 +184,14 @@ def test_levels_can_be_seen(table):
     cup, kettle = model.geom("cup/content"), model.geom("kettle/content")
     liquids.paint(model, table.data)
     empty, full = cup.pos[2], kettle.pos[2]
-    assert (cup.rgba[3], kettle.rgba[3], model.geom("spill").rgba[3]) == (0, 1, 0)
+    assert (cup.rgba[3], kettle.rgba[3], model.geom("spill_water_0").rgba[3]) == (0, 1, 0)
     liquids.amounts["kettle"], liquids.cup["water"], liquids.spilled["water"] = 0.0, 80.0, 20.0
     liquids.paint(model, table.data)
     assert cup.pos[2] - empty == pytest.approx(80e-6 / (np.pi * CUP_RADIUS**2))
     assert kettle.pos[2] < full
     assert (cup.rgba[3], kettle.rgba[3]) == (1, 0)
-    assert model.geom("spill").rgba[3] > 0
+    assert model.geom("spill_water_0").rgba[3] > 0
+    assert model.geom("spill_milk_0").rgba[3] == 0
 
 
 def test_a_picture_shows_the_level_of_now_and_not_of_the_last_step():

@@ -86,7 +86,7 @@ def test_distractors_stand_in_a_zone_and_apart(seed):
     for k, thing in enumerate(things):
         kind = DISTRACTORS[thing.name]
         assert any(
-            zone.room(kind)
+            zone.fits(kind)
             and zone.x[0] <= thing.x - kind.radius <= thing.x + kind.radius <= zone.x[1]
             and zone.y[0] <= thing.y - kind.radius <= thing.y + kind.radius <= zone.y[1]
             for zone in ZONES

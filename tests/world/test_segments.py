@@ -1,12 +1,15 @@
 """Masks name what is seen, depths say how far it is, and pictures stay what they were."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from teasim.render import StationRenderer
 from teasim.world.liquids import Stream
-from teasim.world.looks import Cloth, Distractor, Look
+from teasim.world.looks import Cloth, Distractor, Look, sample_look
 from teasim.world.segments import SEGMENT_NAMES, segments
+from teasim.world.station import sample_layout
 
 PROPS = ("kettle", "cup", "milk_jug", "sugar_pot", "tea_bag", "spoon", "holders", "hob", "knob")
 NUMBER = {name: number for number, name in enumerate(SEGMENT_NAMES)}
@@ -80,6 +83,49 @@ def test_streams_walls_cloths_and_distractors_are_told_apart(simulation):
     table = NUMBER["table"]
     assert np.mean((mask == table)[same] == (bare == table)[same]) > 0.995
     assert (mask == NUMBER["background"]).sum() > (bare == NUMBER["background"]).sum()
+
+
+def fields(structure) -> dict[str, object]:
+    """All numbers of a MuJoCo structure by name, as bytes or nested."""
+    found = {}
+    for name in (name for name in dir(structure) if not name.startswith("_")):
+        value = getattr(structure, name)
+        if isinstance(value, np.ndarray):
+            found[name] = value.tobytes()
+        elif isinstance(value, int | float):
+            found[name] = value
+    return found
+
+
+@pytest.mark.parametrize("quality", ["fast", "nice"])
+def test_a_closed_renderer_leaves_the_model_as_it_was(simulation, quality):
+    model = simulation.model
+
+    def everything() -> list[dict[str, object]]:
+        vis = model.vis
+        return [fields(part) for part in (model, vis.map, vis.quality, vis.global_, vis.headlight)]
+
+    before = everything()
+    look = sample_look(np.random.default_rng(3))
+    worn = replace(look, cloth=Cloth("check"), distractors=(Distractor("bottle", -0.2, -0.45),))
+    with StationRenderer(simulation, width=48, height=40, quality=quality, look=worn) as renderer:
+        simulation.liquids.spilled["water"] = 50.0
+        renderer.picture("left")
+        assert everything() != before
+    assert everything() == before
+
+
+@pytest.mark.parametrize("name", PROPS)
+def test_the_front_camera_shows_everything(simulation, name):
+    for seed in range(5):
+        simulation.reset(sample_layout(np.random.default_rng(seed)))
+        geoms = np.flatnonzero(segments(simulation.model) == NUMBER[name])
+        for geom in geoms:
+            middle, reach = simulation.data.geom_xpos[geom], simulation.model.geom_rbound[geom]
+            row, column, away = pixel(simulation, "front", middle)
+            margin = reach * SIDE / 2 / np.tan(np.radians(48) / 2) / away
+            assert margin <= row <= SIDE - margin
+            assert margin <= column <= SIDE - margin
 
 
 def test_a_quality_leaves_nothing_behind_for_the_next(simulation):

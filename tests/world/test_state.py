@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from teasim.common.errors import ConfigError
-from teasim.skills.arm import Style
 from teasim.skills.library import perform
+from teasim.skills.style import Style
 from teasim.world.simulation import Simulation
 from teasim.world.station import nominal_layout, sample_layout
 

@@ -107,7 +107,8 @@ def _from_group(file: Any, group: int, name: str, rows: np.ndarray) -> Iterator[
         inside = rows[(rows >= first) & (rows < first + len(batch))] - first
         for row in inside.tolist():
             value = batch.column(0)[row].as_py()
-            yield (value.get("bytes") if isinstance(value, dict) else value) or b""
+            stored = value.get("bytes") if isinstance(value, dict) else value
+            yield stored if isinstance(stored, bytes) else b""
         first += len(batch)
 
 

@@ -106,7 +106,8 @@ def as_numpy(column: pa.ChunkedArray, name: str = "column") -> np.ndarray:
     if len(lengths) > 1:
         raise PoolError(f"The vectors of column '{name}' differ in length.")
     values = as_numpy(pa.chunked_array([flat]), name)
-    return values.reshape(len(array), *values.shape[1:], -1) if len(array) else values
+    width = int(lengths[0]) if len(array) else 0
+    return values.reshape(len(array), width, *values.shape[1:]) if len(array) else values
 
 
 def numbers(column: pa.ChunkedArray, name: str) -> np.ndarray:
@@ -131,7 +132,7 @@ def whole_numbers(column: pa.ChunkedArray, name: str) -> np.ndarray:
     if values.dtype.kind == "b":
         raise PoolError(f"The column '{name}' does not hold one number per row.")
     if values.dtype.kind == "f":
-        wrong = ~(np.abs(values) <= MOST_WHOLE) | (values != np.floor(values))
+        wrong = ~(np.abs(values) <= MOST_WHOLE) | (values != np.trunc(values))
         if wrong.any():
             raise PoolError(f"The column '{name}' holds {values[wrong][0]}, no whole number.")
     return values.astype(np.int64)

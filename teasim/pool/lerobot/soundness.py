@@ -16,11 +16,11 @@ from teasim.common.errors import PoolError
 from teasim.common.files import sha256_of
 from teasim.pool.clips import probe
 from teasim.pool.lerobot.columns import as_numpy, read_columns
+from teasim.pool.lerobot.describing.features import NOT_NUMBERS
+from teasim.pool.lerobot.describing.metadata import Metadata, metadata_notes
+from teasim.pool.lerobot.describing.places import inside
 from teasim.pool.lerobot.episode import Episode
 from teasim.pool.lerobot.log import TIME_TOLERANCE
-from teasim.pool.lerobot.logs import NOT_NUMBERS
-from teasim.pool.lerobot.metadata import Metadata, metadata_notes
-from teasim.pool.lerobot.places import inside
 
 FRAME = 0.9
 """Lengths that differ by less than this share of a frame are equal; times are rounded."""
@@ -158,14 +158,15 @@ def _check_video(meta: Metadata, episode: Episode, key: str) -> Iterator[str]:
     begin = float(row.get(f"videos/{key}/from_timestamp", 0.0))
     end = row.get(f"videos/{key}/to_timestamp")
     last = begin + episode.length / fps
-    if last - video.duration > FRAME / fps:
+    slack = FRAME / min(fps, video.fps)  # a camera may have a rate of its own
+    if last - video.duration > slack:
         yield (
             f"The video '{path}' is shorter than the log: it has {video.n_frames} frames but "
             f"demonstration {episode.index} ends at frame {round(last * fps)}."
         )
         return
     told = video.duration if end is None else float(end)
-    if told - last > FRAME / fps:
+    if told - last > (slack if end is None else FRAME / fps):
         yield (
             f"The log of demonstration {episode.index} is shorter than its video '{path}': it ends "
             f"at frame {round(last * fps)} of {round(told * fps)}."

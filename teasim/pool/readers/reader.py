@@ -52,7 +52,3 @@ class Reader:
     """Fields of `ReadOptions` that `open` looks at; any other one that is given is refused."""
     find: Callable[[str], Path | None] | None = None
     """Returns where the data set of a name that is no path is stored; None where there is none."""
-    check: Callable[[Path], list[str]] | None = None
-    """Looks for damage in all of it, pictures included, and returns a sentence for each; raises
-    PoolError when there is nothing to look at. None: its files have no pictures to decode, and
-    what `Source.problems` tells is all."""

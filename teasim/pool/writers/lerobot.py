@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from teasim.pool.lerobot.assembly import Assembly
+from teasim.pool.lerobot.writing.assembly import Assembly
 from teasim.pool.writers import lerobot_parts
 from teasim.pool.writers.content import Content
 from teasim.pool.writers.lerobot_verdicts import write_verdicts

@@ -10,10 +10,10 @@ import pyarrow as pa
 
 from teasim.pool.clips import probe
 from teasim.pool.lerobot import layout
-from teasim.pool.lerobot.assembly import Outline, Part, truth_columns
 from teasim.pool.lerobot.columns import read_table, write_table
 from teasim.pool.lerobot.labels import STYLE
-from teasim.pool.lerobot.statistics import FRAME_STRIDE, ImageHistogram
+from teasim.pool.lerobot.writing.assembly import Outline, Part, truth_columns
+from teasim.pool.lerobot.writing.statistics import FRAME_STRIDE, ImageHistogram
 from teasim.pool.types import Span, index_from_spans
 from teasim.pool.weight_table import WeightRow
 from teasim.pool.writers.content import Content, Item, sampled, sampled_spans

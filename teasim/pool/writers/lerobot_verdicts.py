@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 
 from teasim.common.files import write_text
-from teasim.pool.lerobot.assembly import write_parquet
+from teasim.pool.lerobot.writing.assembly import write_parquet
 from teasim.pool.writers.content import Content
 
 WEIGHTS = Path("meta/teasim_weights.parquet")

@@ -1,10 +1,10 @@
-"""Sets of pools that are made by one word."""
+"""Named sets of pools."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
 
 from teasim.common.registry import named
-from teasim.generate.config import GenerateConfig
+from teasim.generation.config import GenerateConfig
 
 PRESETS: Mapping[str, Mapping[str, GenerateConfig]] = MappingProxyType(
     {
@@ -16,7 +16,7 @@ PRESETS: Mapping[str, Mapping[str, GenerateConfig]] = MappingProxyType(
         },
     }
 )
-"""Pools by the folder they go to; people have no joint log, so they are a pool of their own."""
+"""Settings of pools by their folder; people have no joint log and need a pool of their own."""
 
 
 def find_preset(name: str) -> Mapping[str, GenerateConfig]:

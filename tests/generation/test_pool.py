@@ -7,15 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import teasim.generate
 from teasim.common.errors import GenerationError, PoolError, SkillError
 from teasim.constants import SUBTASKS
-from teasim.generate import DemoPlan, GenerateConfig, generate, plan_pool, recording
-from teasim.generate.recording import ATTEMPTS, generate_demo
+from teasim.generation import DemoPlan, GenerateConfig, generate, making, plan_pool, recording
+from teasim.generation.recording import ATTEMPTS, generate_demo
 from teasim.pool import Pool
 from teasim.pool.integrity import check_pool
 from teasim.task.mistakes import Plan, PlannedMistake
-from teasim.world.events import KNOB_OFF, KNOB_ON
+from teasim.task.subtasks import KNOB_OFF, KNOB_ON
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES
 
 SMALL = GenerateConfig(seq1=0, seq3=2, size=64, cameras=("left", "cup"), seed=3)
@@ -30,7 +29,7 @@ SHORT = (
 @pytest.fixture
 def short(monkeypatch):
     """Plans of one sub-task; they reach the workers as arguments."""
-    monkeypatch.setattr(teasim.generate, "plan_pool", lambda _: SHORT)
+    monkeypatch.setattr(making, "plan_pool", lambda _: SHORT)
 
 
 def digests(root: Path) -> dict[str, str]:
@@ -58,7 +57,7 @@ def test_files_do_not_depend_on_workers_nor_on_interruptions(tmp_path, short):
 
 
 def test_a_finished_pool_is_not_touched_again(tmp_path, short, monkeypatch):
-    monkeypatch.setattr(teasim.generate, "plan_pool", lambda _: SHORT[:1])
+    monkeypatch.setattr(making, "plan_pool", lambda _: SHORT[:1])
     generate(tmp_path / "pool", SMALL)
     before = digests(tmp_path / "pool")
     with pytest.raises(PoolError, match="already holds a finished pool; choose another folder"):
@@ -67,7 +66,7 @@ def test_a_finished_pool_is_not_touched_again(tmp_path, short, monkeypatch):
 
 
 def test_what_comes_out_wrong_is_made_again_with_other_randomness(tmp_path, monkeypatch):
-    monkeypatch.setattr(teasim.generate, "plan_pool", lambda _: SHORT[:1])
+    monkeypatch.setattr(making, "plan_pool", lambda _: SHORT[:1])
     record, draws = recording._record, []
 
     def clumsy(writer, config, demo, rng):

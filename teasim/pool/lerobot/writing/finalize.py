@@ -8,9 +8,9 @@ from typing import Any
 from teasim.common.errors import PoolError
 from teasim.common.files import sync
 from teasim.pool.lerobot import layout
-from teasim.pool.lerobot.assembly import Assembly, Outline, Part, truth_columns
 from teasim.pool.lerobot.reader import Pool
-from teasim.pool.lerobot.staging import (
+from teasim.pool.lerobot.writing.assembly import Assembly, Outline, Part, truth_columns
+from teasim.pool.lerobot.writing.staging import (
     StagedEpisode,
     claim_folder,
     load_staged,

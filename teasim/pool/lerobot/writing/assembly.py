@@ -12,7 +12,7 @@ import pyarrow as pa
 from teasim.common.files import link_or_copy, sha256_of, write_atomically, write_json
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, write_table
-from teasim.pool.lerobot.statistics import (
+from teasim.pool.lerobot.writing.statistics import (
     ImageHistogram,
     Stats,
     column_stats,

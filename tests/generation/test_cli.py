@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-import teasim.generate
 from teasim.cli.main import main
 from teasim.common.errors import RenderError
-from teasim.generate import recording
+from teasim.generation import making, recording
 from teasim.task.mistakes import MISTAKES
-from tests.generate.test_pool import SHORT, digests
+from tests.generation.test_pool import SHORT, digests
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,7 +26,7 @@ ROOT = Path(__file__).parents[2]
             ["--mistakes", "skip:many"],
             "'skip:many' is no mistake with a count; write NAME[@SUBTASK][+NAME...][:COUNT].",
         ),
-        (["--cameras", "back"], "Unknown camera 'back'; choose left, cup, front, top."),
+        (["--camera", "back"], "Unknown camera 'back'; choose left, cup, front, top."),
         (["--size", "63"], "The size is 63; choose an even number from 32 to 1024."),
         (["--seq1", "0"], "The pool would be empty; ask for demonstrations with --seq1 N."),
         (["--seq1", "-3"], "--seq1 is -3; give 0 or more demonstrations."),
@@ -76,9 +75,9 @@ def test_an_unfinished_pool_of_other_settings_is_left_alone(tmp_path, capsys, mo
 
 
 def test_a_pool_is_made_and_told_about(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(teasim.generate, "plan_pool", lambda _: SHORT[:1])
+    monkeypatch.setattr(making, "plan_pool", lambda _: SHORT[:1])
     pool = tmp_path / "pool"
-    assert main(["generate", str(pool), "--size", "64", "--cameras", "cup", "--jobs", "1"]) == 0
+    assert main(["generate", str(pool), "--size", "64", "--camera", "cup", "--jobs", "1"]) == 0
     told = capsys.readouterr()
     assert told.out.startswith(f"1 demonstrations in {pool} (")
     assert told.out.endswith("0 made again because they did not come out as labelled)\n")
@@ -98,7 +97,7 @@ def test_without_opengl_nothing_is_begun(tmp_path, capsys, monkeypatch):
     def missing():
         raise RenderError("No headless OpenGL back end works.")
 
-    monkeypatch.setattr(teasim.generate, "choose_gl", missing)
+    monkeypatch.setattr(making, "choose_gl", missing)
     assert main(["generate", str(tmp_path / "pool"), "--seq1", "1"]) == 2
     assert capsys.readouterr().err == "teasim: No headless OpenGL back end works.\n"
     assert list(tmp_path.iterdir()) == []

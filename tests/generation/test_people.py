@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-import teasim.generate
+import teasim.generation
 from teasim.cli import generate as verb
 from teasim.cli.main import main
 from teasim.common.errors import ConfigError
-from teasim.generate import DemoPlan, GenerateConfig, generate, plan_pool
-from teasim.generate.presets import PRESETS, find_preset
+from teasim.generation import DemoPlan, GenerateConfig, generate, plan_pool
+from teasim.generation.presets import PRESETS, find_preset
 from teasim.pool.integrity import check_pool
 from teasim.skills.demonstrators import PARTICIPANTS
 from teasim.task.mistakes import Plan, PlannedMistake
@@ -40,7 +40,7 @@ def test_people_have_orders_of_their_own_among_the_legal_ones():
 def films(tmp_path_factory):
     """One short film of a person, in the fixed look and in a random one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(teasim.generate, "plan_pool", lambda _: (SHORT,))
+        patch.setattr(teasim.generation, "plan_pool", lambda _: (SHORT,))
         root = tmp_path_factory.mktemp("people")
         return {
             look: generate(
@@ -86,9 +86,9 @@ def test_a_preset_makes_its_pools_in_folders_of_their_own(name, tmp_path, monkey
     def fake(folder, config, **_):
         made[folder] = config
         pool = type("Pool", (), {"episodes": range(sum(config.counts.values()))})
-        return teasim.generate.Generated(pool, 1)
+        return teasim.generation.Generated(pool, 1)
 
-    monkeypatch.setattr(teasim.generate, "generate", fake)
+    monkeypatch.setattr(teasim.generation, "generate", fake)
     assert verb.main([str(tmp_path), "--preset", name, "--seed", "7", "--size", "64"]) == 0
     assert {path.name for path in made} == set(PRESETS[name])
     assert {(config.seed, config.size) for config in made.values()} == {(7, 64)}

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.cli.generate import parse_mistakes
 from teasim.common.errors import ConfigError
 from teasim.constants import FPS, STATE_NAMES, SUBTASKS
-from teasim.generate import DemoPlan, GenerateConfig, plan_pool
-from teasim.generate.recording import mismatch, pool_header
+from teasim.generation import DemoPlan, GenerateConfig, plan_pool
+from teasim.generation.config import parse_mistakes
+from teasim.generation.recording import mismatch, pool_header
 from teasim.task.mistakes import MISTAKES, Plan, PlannedMistake
 from teasim.task.recipes import CRITICAL, SEQ_1, SEQ_2, is_legal
 from teasim.world.events import Event
@@ -115,7 +115,7 @@ def test_the_header_tells_how_the_pool_was_made():
         ({"legal": -1}, "--legal is -1; give 0 or more demonstrations."),
         (
             {"optional": ("add_water",)},
-            "'add_water' is no optional ingredient; choose add_sugar, add_milk.",
+            "'add_water' is not optional; choose add_sugar, add_milk.",
         ),
         ({"seed": -1}, "The seed is -1; choose 0 or more."),
     ],

@@ -1,42 +1,40 @@
-"""Pools of demonstrations: planned, carried out in physics, checked, and written with video."""
+"""A whole pool: every demonstration planned, made in parallel processes, and put together."""
 
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from teasim.common.parallel import check_workers, run
-from teasim.generate.config import GenerateConfig
-from teasim.generate.plan import DemoPlan, plan_pool
-from teasim.generate.recording import demo_rng, generate_demo, pool_header
+from teasim.generation.config import GenerateConfig
+from teasim.generation.plan import plan_pool
+from teasim.generation.recording import generate_demo, pool_header
 from teasim.gl import choose_gl
 from teasim.pool import Pool, claim_folder, episode_is_done, finalize_pool
-
-__all__ = ["DemoPlan", "GenerateConfig", "Generated", "demo_rng", "generate", "plan_pool"]
 
 
 @dataclass(frozen=True)
 class Generated:
-    """A finished pool and what it took."""
+    """A finished pool and the number of attempts that were discarded."""
 
     pool: Pool
     """The pool."""
     remade: int
-    """Demonstrations thrown away because they did not come out as labelled."""
+    """Demonstrations that were made again because they did not come out as labelled."""
 
 
 def generate(
     root: Path | str, config: GenerateConfig, *, jobs: int = 1, backend: str = "loky"
 ) -> Generated:
-    """Make a pool below `root`, in `jobs` processes; an interrupted one is continued.
+    """Make a pool in the folder `root`, in `jobs` processes; an unfinished pool is resumed.
 
     Raises:
-        ConfigError: `jobs` or `backend` makes no sense.
+        ConfigError: `jobs` is not positive, or `backend` is unknown.
         PoolError: `root` is in use.
         GenerationError: a demonstration never came out as labelled.
         RenderError: no headless OpenGL back end works.
     """
     check_workers(jobs, backend)
-    choose_gl()  # without it nothing can be filmed, so nothing is begun
+    choose_gl()  # fails before anything is written if nothing can be rendered
     plans = plan_pool(config)
     header = pool_header(config)
     claim_folder(Path(root), header)

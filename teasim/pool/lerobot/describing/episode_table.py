@@ -15,7 +15,7 @@ import pyarrow as pa
 from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import numbers, read_table, whole_numbers
-from teasim.pool.lerobot.documents import read_lines
+from teasim.pool.lerobot.describing.documents import read_lines
 
 Row = Mapping[str, Any]
 """A demonstration's row of the episodes table, without its statistics."""
@@ -136,6 +136,8 @@ def _checked_part(
 ) -> EpisodeTable:
     table = read_table(file, wanted=lambda name: not name.startswith("stats/"))
     columns = {}
+    ends = [name.replace("/from_", "/to_") for name in times]
+    times = [*times, *(name for name in ends if name in table.column_names)]
     for name in [*whole, *times]:
         if name not in table.column_names:
             raise PoolError(f"The episodes table of '{root}' is damaged: '{name}' is missing.")

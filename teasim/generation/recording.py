@@ -1,4 +1,4 @@
-"""One demonstration of a pool: carried out, checked against its label, and written with video."""
+"""One demonstration of a pool: carried out, checked against its labels, and written."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -8,47 +8,48 @@ from pathlib import Path
 import numpy as np
 
 from teasim.common.errors import GenerationError, SkillError
-from teasim.constants import FPS, STATE_NAMES, SUBTASKS
-from teasim.generate.config import GenerateConfig
-from teasim.generate.plan import DemoPlan
+from teasim.constants import FPS, SUBTASKS
+from teasim.generation.config import GenerateConfig
+from teasim.generation.plan import DemoPlan
 from teasim.pool import EpisodeRecord, EpisodeWriter, MistakeSpan, PoolHeader, Span
 from teasim.render import StationRenderer
 from teasim.rollout import Step, demonstrate
 from teasim.skills.demonstrators import PARTICIPANTS
 from teasim.task.mistakes import PlannedMistake
+from teasim.task.recipes import oven_is_on
 from teasim.task.scoring import Verdict, judge, spills
-from teasim.world.liquids import VESSELS
+from teasim.task.subtasks import find_subtask
+from teasim.world.embodiments import find_embodiment
 from teasim.world.looks import draw_look
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 
 ATTEMPTS = 6
-"""A demonstration that does not come out as its label says is made again at most this often."""
-_CONTENT = {f"add_{vessel.content}": vessel.content for vessel in VESSELS.values()}
+"""Largest number of attempts at a demonstration that does not come out as labelled."""
 
 
 def pool_header(config: GenerateConfig) -> PoolHeader:
-    """What all demonstrations of the pool have in common."""
-    person = config.embodiment == "person"  # a film of people comes without any log
+    """Return what all demonstrations of the pool have in common."""
+    body = find_embodiment(config.embodiment)
     return PoolHeader(
         fps=FPS,
         cameras=config.cameras,
         height=config.size,
         width=config.size,
         subtasks=SUBTASKS,
-        state_names=None if person else STATE_NAMES,
-        environment_state_names=None if person else ENVIRONMENT_STATE_NAMES,
-        robot_type=None if person else "abb_yumi",
+        state_names=body.state_names if body.logged else None,
+        environment_state_names=ENVIRONMENT_STATE_NAMES if body.logged else None,
+        robot_type=body.robot_type,
         config=asdict(config),
     )
 
 
 def demo_rng(seed: int, index: int, attempt: int = 0) -> np.random.Generator:
-    """Randomness of one attempt at a pool's demonstration; nearly always the first one is kept."""
+    """Return the generator of one attempt at a demonstration; nearly always the first succeeds."""
     return np.random.default_rng([seed, 1, index, attempt])
 
 
 def generate_demo(root: Path, config: GenerateConfig, demo: DemoPlan) -> int:
-    """Carry one demonstration out until it comes out as labelled; return the attempts it took.
+    """Carry out one demonstration until it comes out as labelled; return the number of attempts.
 
     Raises:
         GenerationError: it never did.
@@ -72,7 +73,7 @@ def generate_demo(root: Path, config: GenerateConfig, demo: DemoPlan) -> int:
 def _record(
     writer: EpisodeWriter, config: GenerateConfig, demo: DemoPlan, rng: np.random.Generator
 ) -> str:
-    """Write one attempt; return why it is not as labelled, or nothing when it is."""
+    """Write one attempt; return why it is not as labelled, or "" if it is."""
     simulation = Simulation(config.embodiment)
     participant = PARTICIPANTS[demo.participant]
     steps = demonstrate(
@@ -88,7 +89,13 @@ def _record(
         rewarded = False
         for step in steps:
             success = _verdict(simulation).success
-            _add_frame(writer, simulation, renderer, config, step, success, not rewarded)
+            writer.add_frame(
+                images=renderer.frames(config.cameras),
+                **_log(simulation, step),
+                subtask_index=SUBTASKS.index(step.subtask),
+                reward=float(success and not rewarded),
+                success=success,
+            )
             rewarded = rewarded or success
             positions.append(step.position)
     reason = mismatch(demo, simulation)
@@ -98,7 +105,7 @@ def _record(
 
 
 def _camera(simulation: Simulation, config: GenerateConfig, demo: DemoPlan) -> StationRenderer:
-    # Its own randomness: a pool in another look holds the same demonstrations.
+    # With randomness of its own, a pool in another look holds the same demonstrations.
     rng = np.random.default_rng([config.seed, 2, demo.index])
     return StationRenderer(
         simulation,
@@ -109,48 +116,33 @@ def _camera(simulation: Simulation, config: GenerateConfig, demo: DemoPlan) -> S
     )
 
 
-def _add_frame(
-    writer: EpisodeWriter,
-    simulation: Simulation,
-    renderer: StationRenderer,
-    config: GenerateConfig,
-    step: Step,
-    success: bool,
-    first: bool,
-) -> None:
-    logged = config.embodiment != "person"
-    writer.add_frame(
-        images=renderer.frames(config.cameras),
-        state=simulation.joint_state() if logged else None,
-        action=step.target if logged else None,
-        environment_state=simulation.environment_state() if logged else None,
-        subtask_index=SUBTASKS.index(step.subtask),
-        reward=float(success and first),
-        success=success,
-    )
+def _log(simulation: Simulation, step: Step) -> dict[str, np.ndarray | None]:
+    """Return the logged columns of a frame; None where the embodiment has no log."""
+    logged = simulation.embodiment.logged
+    return {
+        "state": simulation.joint_state() if logged else None,
+        "action": step.target if logged else None,
+        "environment_state": simulation.environment_state() if logged else None,
+    }
 
 
 def mismatch(demo: DemoPlan, simulation: Simulation) -> str:
-    """Say how what happened physically differs from what the demonstration is labelled as."""
+    """Return how the physical events differ from the labels of the demonstration, or ""."""
     done, expected = simulation.subtasks_done, demo.plan.outcome
     if done != expected:
         happened, planned = Counter(done), Counter(expected)
         missing = ", ".join((planned - happened).elements()) or "none"
         extra = ", ".join((happened - planned).elements()) or "none"
         return f"Physics saw another order than planned (missing: {missing}; extra: {extra})."
-    meant = [f"spilled_{_CONTENT[name]}" for name in demo.plan.spilled]
+    meant = [f"spilled_{find_subtask(name).content}" for name in demo.plan.spilled]
     spilled = spills(simulation.liquids.spilled)
     if set(spilled) - set(meant):
         return f"Something went beside the cup ({', '.join(spilled)})."
     if set(meant) - set(spilled):
         return f"Something was to go beside the cup and did not ({', '.join(meant)})."
-    if simulation.oven_on != (_turns(expected) > 0):
+    if simulation.oven_on != oven_is_on(expected):
         return "The oven is not as the knob was turned."
     return ""
-
-
-def _turns(done: Sequence[str]) -> int:
-    return done.count("turn_on_oven") - done.count("turn_off_oven")
 
 
 def _verdict(simulation: Simulation) -> Verdict:
@@ -167,7 +159,7 @@ def _episode_record(demo: DemoPlan, positions: Sequence[int], seed: int) -> Epis
     starts = [*(int(np.argmax(at == k)) for k in range(len(steps))), len(at)]
     spans = tuple(Span(name, starts[k], starts[k + 1]) for k, name in enumerate(steps))
     mistakes = sorted(
-        (_mistake_span(planned, starts) for planned in demo.plan.mistakes),
+        (_mistake_span(planned, starts) for planned in demo.plan.labels),
         key=lambda span: (span.start, span.subtask),
     )
     return EpisodeRecord(
@@ -182,7 +174,7 @@ def _episode_record(demo: DemoPlan, positions: Sequence[int], seed: int) -> Epis
 
 
 def _mistake_span(planned: PlannedMistake, starts: Sequence[int]) -> MistakeSpan:
-    """A mistake lasts as long as its step; what is skipped has a place and no length."""
+    """Return the span of a mistake: that of its step, or an empty one where a step is skipped."""
     start = starts[planned.position]
     stop = start if planned.name == "skip" else starts[planned.position + 1]
     return MistakeSpan(planned.name, planned.subtask, start, stop)
