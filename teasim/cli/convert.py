@@ -62,9 +62,9 @@ class ConvertSettings(ReadSettings):
     anew; each keeps its demo_id."""
     camera: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """Camera whose pictures are written; may be repeated, all cameras by default."""
-    language: bool = True
-    """Write the sub-tasks of LeRobot data sets as sentences too (language_persistent), which
-    LeRobot before version 0.6 cannot open."""
+    language: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Also write the sub-tasks of a LeRobot data set as sentences (language_persistent), which
+    LeRobot trains on since version 0.6 and cannot open before it."""
     jobs: int | None = None
     """Number of worker processes; by default one per core."""
 

@@ -49,7 +49,7 @@ class Content:
     """The demonstrations in their order."""
     found: bool = False
     """Whether the spans were found by a segmenter, not logged or named by a person."""
-    language: bool = True
+    language: bool = False
     """Whether LeRobot data sets also get the sub-tasks as sentences (language_persistent)."""
 
     @property
@@ -91,7 +91,7 @@ class Choice:
     """New names of sub-tasks by the old ones."""
     drop_flagged: bool = False
     """Leave out the demonstrations that the weight table flags."""
-    language: bool = True
+    language: bool = False
     """Whether LeRobot data sets also get the sub-tasks as sentences."""
 
 
