@@ -21,8 +21,8 @@ EXAMPLES = (
     "teasim convert pool kept.hdf5 --to robomimic --weights findings/weights.csv",
 )
 LABEL_EXAMPLES = (
-    "teasim label videos --segments findings/segments.csv --names names.txt -o labelled",
-    "teasim label pool --segments findings/segments.csv --names names.json -o tree --to ms-tcn",
+    "teasim label videos --segments f/segments.csv --names n.txt -o named",
+    "teasim label pool --segments f/segments.csv --names n.json -o out --to ms-tcn",
 )
 
 
@@ -96,10 +96,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     settings = parse(ConvertSettings, argv, verb="convert", examples=EXAMPLES)
     from teasim.pool.segments_table import read_segments_table
-    from teasim.pool.subtask_names import read_names
     from teasim.pool.weight_table import read_weight_table
     from teasim.pool.writers.content import Choice
     from teasim.pool.writers.registry import writer_named
+    from teasim.pool.writers.subtask_names import read_names
 
     choice = Choice(
         cameras=settings.camera,
@@ -121,9 +121,9 @@ def label(argv: Sequence[str] | None = None) -> int:
     """
     settings = parse(LabelSettings, argv, verb="label", examples=LABEL_EXAMPLES)
     from teasim.pool.segments_table import read_segments_table
-    from teasim.pool.subtask_names import read_names
     from teasim.pool.writers.content import Choice
     from teasim.pool.writers.registry import writer_like, writer_named
+    from teasim.pool.writers.subtask_names import read_names
 
     choice = Choice(
         segments=read_segments_table(settings.segments), names=read_names(settings.names)

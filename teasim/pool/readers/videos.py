@@ -13,9 +13,15 @@ from pathlib import Path
 from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip, VideoInfo, probe
 from teasim.pool.readers.reader import Reader, ReadOptions
+from teasim.pool.readers.video_labels import (
+    LABELS,
+    DemoRow,
+    is_table,
+    read_demonstrations,
+    read_labels,
+)
 from teasim.pool.recordings import RecordedSource, Recording, unreadable
 from teasim.pool.types import Span
-from teasim.pool.video_labels import LABELS, DemoRow, is_table, read_demonstrations, read_labels
 
 SUFFIXES = frozenset(
     [

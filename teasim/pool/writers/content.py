@@ -12,9 +12,9 @@ import numpy as np
 from teasim.common.errors import ConfigError
 from teasim.pool.segments_table import SegmentRow, spans_by_demonstration
 from teasim.pool.source import Demonstration, Source
-from teasim.pool.subtask_names import check_names, listed, renamed
 from teasim.pool.types import Span
 from teasim.pool.weight_table import WeightRow, match_rows
+from teasim.pool.writers.subtask_names import check_names, listed, renamed
 
 
 @dataclass(frozen=True)

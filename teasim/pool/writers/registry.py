@@ -6,14 +6,15 @@ from teasim.common.errors import ConfigError
 from teasim.common.registry import named
 from teasim.pool.lerobot import layout
 from teasim.pool.readers.registry import reader_of
-from teasim.pool.writers import lerobot, lerobot_v21, minari, ms_tcn, robomimic, videos
+from teasim.pool.writers import minari, ms_tcn, robomimic, videos
+from teasim.pool.writers.lerobot import v21, v30
 from teasim.pool.writers.writer import Writer
 
 WRITERS: dict[str, Writer] = {
     writer.name: writer
     for writer in (
-        lerobot.WRITER,
-        lerobot_v21.WRITER,
+        v30.WRITER,
+        v21.WRITER,
         robomimic.WRITER,
         minari.WRITER,
         videos.WRITER,
@@ -40,7 +41,7 @@ def writer_like(source: Path) -> Writer:
         PoolError: no reader recognises the source.
     """
     if (source / layout.EPISODES_LINES).exists():
-        return lerobot_v21.WRITER
+        return v21.WRITER
     reader = reader_of(source).name
     for writer in WRITERS.values():
         if writer.reader == reader:

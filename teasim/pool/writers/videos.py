@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from teasim.common.files import link_or_copy
+from teasim.pool.readers.video_labels import DemoRow, LabelRow, write_tables
 from teasim.pool.readers.videos import natural
-from teasim.pool.video_labels import DemoRow, LabelRow, write_tables
 from teasim.pool.weight_table import write_weight_table
 from teasim.pool.writers.content import Content, Item
 from teasim.pool.writers.pictures import encoding_note, safe_names, write_mp4

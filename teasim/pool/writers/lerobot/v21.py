@@ -8,9 +8,9 @@ from typing import Any
 from teasim.common.files import link_or_copy, write_json, write_text
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.writing.assembly import Assembly, write_parquet
-from teasim.pool.writers import lerobot_parts
 from teasim.pool.writers.content import Content
-from teasim.pool.writers.lerobot_verdicts import write_verdicts
+from teasim.pool.writers.lerobot import parts as lerobot_parts
+from teasim.pool.writers.lerobot.verdicts import write_verdicts
 from teasim.pool.writers.writer import Writer
 
 VERSION = "v2.1"

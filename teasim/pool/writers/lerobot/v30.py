@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from teasim.pool.lerobot.writing.assembly import Assembly
-from teasim.pool.writers import lerobot_parts
 from teasim.pool.writers.content import Content
-from teasim.pool.writers.lerobot_verdicts import write_verdicts
+from teasim.pool.writers.lerobot import parts as lerobot_parts
+from teasim.pool.writers.lerobot.verdicts import write_verdicts
 from teasim.pool.writers.writer import Writer
 
 
