@@ -1,9 +1,10 @@
-"""The filter as figure 1 of the paper draws it: segments, features, weights, threshold."""
+"""The filter of figure 1 of the paper: segments, features, weights, threshold."""
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
+from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -13,11 +14,13 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from filtering.config import FilterConfig
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
-from filtering.features.description import describe_segments
+from filtering.features.config import POOLED
+from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
+from filtering.judging.evidence import Evidence
 from filtering.judging.explain import Finding, explain
+from filtering.judging.judges import Judgement, judge_named
 from filtering.judging.thresholds import probability_incorrect
-from filtering.judging.verdict import Evidence, Verdict, judge_named
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
@@ -28,44 +31,64 @@ from teasim.pool.source import Source
 from teasim.pool.weight_table import WeightRow
 
 FEWEST_DEMOS = 3
-"""With fewer demonstrations there is no majority to agree with."""
+"""Least number of demonstrations; fewer have no majority."""
 FEW_DEMOS = 4
-"""With so few or fewer, what can be said of them has a limit that is told: `caution`."""
+"""Number of demonstrations up to which `caution` warns of the limits of the result."""
 ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features")
-"""Settings that mean nothing for step lists."""
+"""Settings that need pictures."""
 
 
 def caution(count: int) -> str | None:
-    """Return what cannot be said of a pool of `count` demonstrations, None if it is large enough.
+    """Return a warning for a small pool of `count` demonstrations, None for a larger one.
 
-    The score `norm` leaves even one missing step of one in three unflagged.
+    With three demonstrations, the score norm does not even flag one that lacks a step.
     """
     if count > FEW_DEMOS:
         return None
     return (
         f"With {count} demonstrations a majority is {count // 2 + 1}: a mistake that 2 of them "
-        "share cannot be told from what is usual, and even that of a single one may not be flagged."
+        "share looks like usual behaviour, and even the mistake of a single one may not be flagged."
     )
 
 
 class DemoFilter:
-    """Gives every demonstration of a pool a weight, without reading whether it is correct.
+    """Gives every demonstration of a pool a weight; labels of correctness are never read.
+
+    Ten step lists, of which the last one lacks a step:
+
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> import numpy as np
+        >>> from filtering import DemoFilter, FilterConfig
+        >>> from teasim.pool.mstcn import write_predictions
+        >>> from teasim.pool.readers.registry import open_source
+        >>> folder = Path(tempfile.mkdtemp())
+        >>> usual, short = np.repeat([0, 1, 2], 5), np.repeat([0, 2], 5)
+        >>> videos = {f"video_{n}": usual for n in range(9)} | {"video_9": short}
+        >>> write_predictions(folder, ("boil", "pour", "stir"), videos, {}, {})
+        >>> pool = open_source(folder)
+        >>> fitted = DemoFilter(FilterConfig(segmenter="predictions")).fit(pool)
+        >>> [pool.episodes[n].name for n in np.flatnonzero(fitted.flagged_)]
+        ['video_9']
+        >>> print(fitted.reasons_[9])
+        After boil (frames 0-5) 'pour' was expected, 'stir' was seen at frame 5; 'pour' is missing \
+from the whole video.
 
     After `fit`, in the order of `pool.episodes`:
         weights_ (D,): in [0, 1], 1 for a usual demonstration.
         losses_ (D,): surprise [nats], higher is worse.
-        probabilities_ (D,): of being incorrect, see `thresholds.probability_incorrect`.
-        flagged_ (D,): True where it is called incorrect.
+        probabilities_ (D,): probability of being incorrect, see `probability_incorrect`.
+        flagged_ (D,): True for demonstrations called incorrect.
         groups_ (D,): group, 0 is the best.
-        group_names_: what each group has in common; empty where only the weights tell.
+        group_names_: what each group has in common; empty where only the weights define it.
         reasons_: a sentence for each flagged demonstration, else "".
-        findings_: strange steps of each demonstration, the one that is named first.
-        threshold_: weight below which a demonstration is flagged, 0 when nothing is.
-        trust_ (D,): how much it shapes what is usual, in [0, 1]; w of equation 3 sums to M.
+        findings_: unusual steps of each demonstration, the most important one first.
+        threshold_: weight below which a demonstration is flagged; 0 when there is none.
+        trust_ (D,): influence on the norm, in [0, 1]; w of equation 3, of sum M.
         objective_: value of equation 3 [nats per step]; None for another score.
         segments_: the segments used.
-        cameras_: those whose pictures show segments and states; effects are looked at in all
-            cameras of the pool unless some are named.
+        cameras_: cameras used for segments and states; effects use all cameras of the pool unless
+            some are named.
         timings_: seconds per stage.
     """
 
@@ -85,7 +108,7 @@ class DemoFilter:
     timings_: dict[str, float]
 
     def __init__(self, config: FilterConfig | None = None) -> None:
-        """Prepare a filter; without `config` with the default settings."""
+        """Keep the settings; None means the defaults."""
         self.config = FilterConfig() if config is None else config
 
     def fit(self, pool: Source, *, jobs: int = 1) -> Self:
@@ -93,11 +116,11 @@ class DemoFilter:
 
         Args:
             pool: what to filter.
-            jobs: worker processes that look at videos; the result does not depend on it.
+            jobs: number of worker processes; the result does not depend on it.
 
         Raises:
-            ConfigError: the pool has too few demonstrations, no camera of that name, or no pictures
-                where a setting is about them.
+            ConfigError: the pool has too few demonstrations, lacks a camera, or has no pictures
+                although a setting needs them.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
         self.timings_ = {}
@@ -108,9 +131,9 @@ class DemoFilter:
             self.segments_ = self._segments(pool, jobs)
         with self._timed("features"):
             evidence = self._evidence(pool, jobs)
-        # The matrices are small: more BLAS threads only wait for each other.
+        # The matrices are small: several BLAS threads would only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
-            self._learn(judge_named(self.config.score)(evidence, self.config.rule()))
+            self._learn(judge_named(self.config.score)(evidence, self.config))
         self.reasons_ = tuple(
             explain(found, pool.fps) if flagged else ""
             for found, flagged in zip(self.findings_, self.flagged_, strict=True)
@@ -147,13 +170,14 @@ class DemoFilter:
             )
 
     def _cameras(self, pool: Source) -> tuple[str, ...]:
-        """Return the cameras to look at, none where there are no pictures."""
+        """Return the cameras to use, none where there are no pictures."""
         if pool.cameras:
             return chosen_cameras(pool, self.config.cameras) or (main_camera(pool),)
-        for setting in ABOUT_PICTURES:
-            if getattr(self.config, setting) != getattr(FilterConfig, setting):
+        usual = {setting.name: setting.default for setting in fields(FilterConfig)}
+        for name in ABOUT_PICTURES:
+            if getattr(self.config, name) != usual[name]:
                 raise ConfigError(
-                    f"'{pool.root}' has no pictures, which {setting} is about; leave it out."
+                    f"'{pool.root}' has no pictures; leave out {name}, which needs them."
                 )
         return ()
 
@@ -162,16 +186,16 @@ class DemoFilter:
         return segmenter(pool, jobs=jobs)
 
     def _evidence(self, pool: Source, jobs: int) -> Evidence:
-        """Return what the score asks for; looking at pictures is what takes time."""
+        """Return the evidence that the score uses."""
         known = Evidence(self.segments_.subtasks, self.segments_.spans)
         if self.config.score == "equation3":
             return replace(known, states=self._states(pool, jobs))
         if self.config.effects and pool.cameras:
-            return replace(known, idle=self._idle(pool, known, jobs))
+            return replace(known, ineffective=self._ineffective(pool, known, jobs))
         return known
 
-    def _idle(self, pool: Source, known: Evidence, jobs: int) -> list[NDArray[np.float64]]:
-        """Return per demonstration (q,): surprise that so little came of each segment [nats]."""
+    def _ineffective(self, pool: Source, known: Evidence, jobs: int) -> list[NDArray[np.float64]]:
+        """Return per demonstration (q,): how surprisingly little each segment changed [nats]."""
         source = FrameSource(self.config.cameras or pool.cameras)
         rests = look_at_rests(
             pool.episodes, self.segments_.spans, frame_rate(pool), source, jobs=jobs
@@ -179,14 +203,20 @@ class DemoFilter:
         return effect_surprises([changes(rest) for rest in rests], known.labels)
 
     def _states(self, pool: Source, jobs: int) -> list[NDArray[np.float64]]:
-        """Return per demonstration (q, N): what its segments look like, else which they are."""
+        """Return per demonstration (q, N): features of its segments; one-hot without pictures."""
         if not pool.cameras:
             eye = np.eye(len(self.segments_.subtasks))
             return [eye[labels] for labels in self.segments_.labels()]
-        features = describe_segments(
-            self.config.features,
+        spans = self.segments_.spans
+        if self.config.features != POOLED:
+            # Imported here because cached pooled features need no torch.
+            from filtering.features.checkpoint import load_features
+
+            learned = load_features(Path(self.config.features))
+            return reduce_features(learned.describe(pool, spans, jobs=jobs))
+        features = segment_features(
             pool,
-            self.segments_.spans,
+            spans,
             cameras=self.cameras_,
             frames_per_segment=self.config.frames_per_segment,
             background=self.config.background,
@@ -194,17 +224,17 @@ class DemoFilter:
         )
         return reduce_features(features)
 
-    def _learn(self, verdict: Verdict) -> None:
-        self.weights_ = verdict.weights
-        self.losses_ = verdict.losses
-        self.probabilities_ = probability_incorrect(verdict.losses)
-        self.trust_ = verdict.trust
-        self.objective_ = verdict.objective
-        self.groups_ = verdict.grouping.groups
-        self.group_names_ = verdict.grouping.names
-        self.flagged_ = verdict.grouping.flagged
-        self.threshold_ = verdict.grouping.threshold
-        self.findings_ = verdict.findings
+    def _learn(self, judgement: Judgement) -> None:
+        self.weights_ = judgement.weights
+        self.losses_ = judgement.losses
+        self.probabilities_ = probability_incorrect(judgement.losses)
+        self.trust_ = judgement.trust
+        self.objective_ = judgement.objective
+        self.groups_ = judgement.grouping.groups
+        self.group_names_ = judgement.grouping.names
+        self.flagged_ = judgement.grouping.flagged
+        self.threshold_ = judgement.grouping.threshold
+        self.findings_ = judgement.findings
 
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:

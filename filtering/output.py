@@ -1,6 +1,7 @@
-"""What a filter leaves behind: weight table, lists for other tools, record of the run, the page."""
+"""The output folder of a filter: weight table, lists for other tools, record of the run, page."""
 
 import platform
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
@@ -22,19 +23,19 @@ from teasim.pool.source import Source
 from teasim.pool.weight_table import write_weight_table
 
 FILES = ("weights.csv", "segments.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
-"""What an output folder holds."""
+"""Files of an output folder."""
 PACKAGES = ("teasim", "numpy", "scipy", "scikit-learn", "torch", "opencv-python-headless")
-"""Packages whose versions are written down, because weights may depend on them."""
+"""Packages whose versions are recorded, because weights may depend on them."""
 
 PROBABILITY = (
-    "share of the upper of two Gaussians of one variance fitted to sqrt(loss), times the "
+    "probability of the upper of two Gaussians of equal variance fitted to sqrt(loss), times the "
     "probability by BIC that there are two"
 )
-"""How probability_incorrect comes about."""
+"""Definition of probability_incorrect."""
 
 
 def check_output(out: Path, source: Path, *, overwrite: bool) -> None:
-    """Refuse an output folder that is in use, before any work is done.
+    """Refuse an output folder that is in use.
 
     Raises:
         ConfigError: `out` is a file, lies in the pool, or holds something else, or an earlier
@@ -59,7 +60,7 @@ def check_output(out: Path, source: Path, *, overwrite: bool) -> None:
     if present and not overwrite:
         raise ConfigError(
             f"The output folder '{out}' holds an earlier filter's output; "
-            "choose another one or say --overwrite."
+            "choose another one or add --overwrite."
         )
 
 
@@ -73,12 +74,14 @@ def write_filter_output(
 ) -> None:
     """Write FILES to the folder `out`, each atomically, the page last.
 
+    An error while the page is made becomes a warning on stderr: the results are already written.
+
     Args:
         out: new or empty folder, or one with an earlier output.
-        pool: what was filtered; it is not modified.
+        pool: what was filtered.
         fitted: the filter after `fit(pool)`.
-        sections: what else goes on the page.
-        overwrite: replace an earlier filter's output.
+        sections: further sections of the page.
+        overwrite: replace an earlier output.
 
     Raises:
         ConfigError: the folder is in use.
@@ -99,18 +102,23 @@ def write_filter_output(
         write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))
     except OSError as error:
         raise TeasimError(f"The output '{out}' cannot be written: {error.strerror}.") from error
-    render_report(
-        folder / "report.html",
-        demos=demo_views(pool, fitted),
-        threshold=fitted.threshold_,
-        subtasks=fitted.segments_.subtasks,
-        sections=sections,
-        unit=Clock(pool.fps).unit,
-    )
+    (folder / "report.html").unlink(missing_ok=True)  # never a page of other weights
+    try:
+        render_report(
+            folder / "report.html",
+            demos=demo_views(pool, fitted),
+            threshold=fitted.threshold_,
+            subtasks=fitted.segments_.subtasks,
+            sections=sections,
+            unit=Clock(pool.fps).unit,
+        )
+    except Exception as error:
+        reason = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+        print(f"teasim: warning: the page could not be made: {reason}.", file=sys.stderr)
 
 
 def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
-    """Return what filter.json holds: enough to repeat the run and to check its result."""
+    """Return the content of filter.json, sufficient to repeat the run and to check its result."""
     return {
         "config": asdict(fitted.config),
         "pool": str(pool.root),
@@ -140,7 +148,7 @@ def _by_demo(fitted: DemoFilter, values: NDArray[np.float64]) -> dict[str, float
 
 
 def selection_text(pool: Source, indexes: Sequence[int], *, keep: bool) -> str:
-    """Return keep.txt or exclude.txt: demonstrations, and how other tools are told of them."""
+    """Return the text of keep.txt or exclude.txt, with the options of other tools as comments."""
     purpose = "keep" if keep else "leave out"
     title = f"{len(indexes)} demonstrations to {purpose}, of {pool.root}"
     comments = [f"# {line}" for line in (title, *pool.usage(indexes, keep=keep))]
@@ -148,7 +156,7 @@ def selection_text(pool: Source, indexes: Sequence[int], *, keep: bool) -> str:
 
 
 def _segmentation_record(fitted: DemoFilter, pool: Source) -> dict[str, Any] | None:
-    """Return what inferred the segments and how good they are, where that is known."""
+    """Return the segmenter and its measures; None where segments were not inferred."""
     found = fitted.segments_
     if found.weights_sha256 is None:
         return None

@@ -1,4 +1,4 @@
-"""Save and load a policy: RUN/policy.safetensors (weights) and RUN/policy.json (what they are)."""
+"""Save and load a policy: RUN/policy.safetensors (weights) and RUN/policy.json (description)."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -10,38 +10,42 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
 from policies.data.samples import ObservationSpec
-from policies.learners.chunks import Memory, MemoryShape
 from policies.learners.motion_policy import MotionPolicy
 from policies.learners.networks import DecisionNetwork, Ensemble, NetworkShape, RecurrentNetwork
+from policies.learners.store import DemonstrationStore, StoreShape
 from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.checkpoint import CheckpointKind
 
 POLICY = CheckpointKind("policy", 2, held="trained policy", remedy="train again")
 
+AnyPolicy = SubtaskPolicy | MotionPolicy
+"""A learned policy of either level."""
+
 
 @dataclass(frozen=True)
-class Kind:
-    """What is built from a description."""
+class PolicyKind:
+    """Classes that a saved policy is rebuilt from."""
 
     network: type[Any]
+    """Class of the network: (shape, seed, further settings) -> network."""
     shape: type[Any]
+    """Dataclass of the sizes of the network."""
     policy: type[Any]
+    """Class of the policy: (network, spec, action names) -> policy."""
 
 
 KINDS = {
     **{
-        network.kind: Kind(network, NetworkShape, SubtaskPolicy)
+        network.kind: PolicyKind(network, NetworkShape, SubtaskPolicy)
         for network in (DecisionNetwork, Ensemble, RecurrentNetwork)
     },
-    Memory.kind: Kind(Memory, MemoryShape, MotionPolicy),
+    DemonstrationStore.kind: PolicyKind(DemonstrationStore, StoreShape, MotionPolicy),
 }
 """The networks a policy may have, by the name they are saved under."""
 
 
-def save_policy(
-    policy: SubtaskPolicy | MotionPolicy, run: Path, *, training: Mapping[str, Any]
-) -> None:
-    """Write `policy` into the folder `run`; `training` (JSON-able) says how it came about."""
+def save_policy(policy: AnyPolicy, run: Path, *, training: Mapping[str, Any]) -> None:
+    """Write `policy` into the folder `run`; `training` (JSON-able) says how it was trained."""
     description = {
         "observation": asdict(policy.spec),
         "actions": policy.action_names,
@@ -53,7 +57,7 @@ def save_policy(
     POLICY.save(run, save_tensors(policy.network.state_dict()), description)
 
 
-def load_policy(run: Path) -> SubtaskPolicy | MotionPolicy:
+def load_policy(run: Path) -> AnyPolicy:
     """Read a policy that `save_policy` wrote.
 
     Raises:
@@ -72,7 +76,7 @@ def load_policy(run: Path) -> SubtaskPolicy | MotionPolicy:
         network.load_state_dict(load_tensors(weights))
     except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
         raise POLICY.mismatch(run) from error
-    policy: SubtaskPolicy | MotionPolicy = kind.policy(network, spec, actions)
+    policy: AnyPolicy = kind.policy(network, spec, actions)
     return policy
 
 

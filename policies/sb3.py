@@ -1,21 +1,20 @@
-"""Policies among those of stable-baselines3: played by its tools, and trained further with PPO.
+"""Policies in stable-baselines3: evaluated with its tools, and trained further with PPO.
 
-Every policy answers `predict` as SB3 asks, so `evaluate_policy` takes it as it is, in an
-environment of `sb3_environment`. A policy without memory that sees the state can become a PPO model
-that does the same, and then learn from its own attempts:
+Every policy has SB3's `predict`, so `evaluate_policy` accepts it unchanged, in an environment of
+`sb3_environment`. A policy that sees the state and is not recurrent can be converted into a PPO
+model with the same probabilities, and trained further by reinforcement:
 
-    from policies.checkpoint import load_policy
-    from policies.play.rollout import EnvironmentConfig
+    from policies import EnvironmentConfig, load_policy
     from policies.sb3 import as_ppo, sb3_environment
 
     policy = load_policy(Path("policy"))          # teasim train POOL --observe state -o policy
     env = sb3_environment(EnvironmentConfig(), policy.spec)
     model = as_ppo(policy, env, n_steps=64, batch_size=64, learning_rate=1e-4)
-    model.learn(2000)                             # actions, each a whole sub-task in physics
+    model.learn(2000)                             # actions, each a whole simulated sub-task
     model.save("finetuned")
 
-The value network starts untrained: keep the learning rate low, or the first updates, made with
-advantages that mean nothing, undo what was cloned.
+The value network starts untrained: keep the learning rate low, or the meaningless advantages of the
+first updates destroy the cloned behaviour.
 """
 
 from typing import Any
@@ -30,12 +29,13 @@ from torch import Tensor
 from policies.data.samples import STATE_KEYS, ObservationSpec
 from policies.learners.networks import DecisionNetwork
 from policies.learners.subtask_policy import SubtaskPolicy
-from policies.play.rollout import EnvironmentConfig, make_environment
+from policies.play.environments import make_environment
+from policies.settings import EnvironmentConfig
 from teasim.common.errors import ConfigError
 
 
 class FlatPictures(gym.ObservationWrapper[Any, Any, Any]):
-    """The picture of every camera under a key of its own: SB3 takes no dict within a dict."""
+    """Gives the picture of every camera a key of its own: SB3 accepts no nested dict spaces."""
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         """Wrap an environment whose `pixels` is a dict of pictures."""
@@ -44,7 +44,7 @@ class FlatPictures(gym.ObservationWrapper[Any, Any, Any]):
         self.observation_space = gym.spaces.Dict(self._flat(spaces, spaces["pixels"].spaces))
 
     def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
-        """Return the observation with `pixels` taken apart."""
+        """Return the observation with one key per camera."""
         return self._flat(observation, observation["pixels"])
 
     def _flat(self, parts: dict[str, Any], pictures: dict[str, Any]) -> dict[str, Any]:
@@ -53,13 +53,13 @@ class FlatPictures(gym.ObservationWrapper[Any, Any, Any]):
 
 
 class StandardisedState(BaseFeaturesExtractor):
-    """The state as a cloned policy sees it: its parts in a row, each number to its scale."""
+    """The state as a cloned policy sees it: concatenated and standardised."""
 
     mean: Tensor
     scale: Tensor
 
     def __init__(self, observation_space: gym.spaces.Dict) -> None:
-        """Begin with mean 0 and scale 1."""
+        """Start with mean 0 and scale 1."""
         length = gym.spaces.flatdim(observation_space)
         super().__init__(observation_space, length)
         self.register_buffer("mean", torch.zeros(length, dtype=torch.float64))
@@ -68,12 +68,12 @@ class StandardisedState(BaseFeaturesExtractor):
     def forward(self, observations: dict[str, Tensor]) -> Tensor:
         """Return the standardised state (n, S) float32 of observations (n, ...)."""
         state = torch.cat([observations[key] for key in STATE_KEYS], dim=1)
-        # In double precision, as when it was cloned: a scale may be small beside its mean.
+        # In double precision, as during cloning: a scale may be much smaller than its mean.
         return ((state.double() - self.mean) / self.scale).float()
 
 
 def sb3_environment(config: EnvironmentConfig, spec: ObservationSpec) -> gym.Env[Any, Any]:
-    """Make the environment a policy of `spec` needs, in the form SB3 takes, with its `Monitor`.
+    """Make the environment for a policy of `spec` in a form that SB3 accepts, in a `Monitor`.
 
     Raises:
         ConfigError: there is no such environment, or it does not take the settings.
@@ -83,13 +83,13 @@ def sb3_environment(config: EnvironmentConfig, spec: ObservationSpec) -> gym.Env
 
 
 def as_ppo(policy: SubtaskPolicy, env: gym.Env[Any, Any], **settings: Any) -> PPO:
-    """Return a PPO model that decides as `policy` does; `settings` are those of `PPO`.
+    """Return a PPO model with the action probabilities of `policy`.
 
     Args:
-        policy: a policy without memory that sees the state (`--observe state`), of learner bc,
-            demodice or r-maxent.
-        env: where it will be played and trained further, see `sb3_environment`.
-        settings: for example `n_steps`, `batch_size`, `learning_rate`, `seed`.
+        policy: a policy that sees the state (`--observe state`), of learner bc, demodice or
+            r-maxent.
+        env: environment for training, see `sb3_environment`.
+        settings: arguments of `PPO`, e.g. `n_steps`, `batch_size`, `learning_rate`, `seed`.
 
     Raises:
         ConfigError: `policy` sees pictures, or its network is not that of such a learner.
@@ -97,8 +97,8 @@ def as_ppo(policy: SubtaskPolicy, env: gym.Env[Any, Any], **settings: Any) -> PP
     network = policy.network
     if policy.spec.cameras or not isinstance(network, DecisionNetwork):
         raise ConfigError(
-            "Only a policy that sees the state and has neither memory nor members can become a PPO "
-            "model; train with --observe state and --learner bc, demodice or r-maxent."
+            "Only a policy that sees the state and is neither recurrent nor an ensemble can become "
+            "a PPO model; train with --observe state and --learner bc, demodice or r-maxent."
         )
     architecture = {
         "features_extractor_class": StandardisedState,

@@ -1,4 +1,4 @@
-"""A pool, a weight table and a learner's name -> a policy on disk."""
+"""Train a policy: a pool, a weight table and a learner's name become a policy on disk."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -8,41 +8,27 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from policies.checkpoint import save_policy
+from policies.checkpoint import AnyPolicy, save_policy
 from policies.data.demos import DemosConfig, load_decisions
-from policies.data.motions import MotionSamples, load_motions
+from policies.data.motions import MotionSamples, check_log, load_motions
 from policies.data.samples import DecisionSamples
 from policies.data.weighting import demo_weights, likely_experts
-from policies.learners.registry import LEARNERS, LearnerKind, find_learner
+from policies.learners.options import parse_assignments, read_options
+from policies.learners.registry import (
+    EXPERTS,
+    LOG,
+    LearnerKind,
+    find_learner,
+    learners_that_need,
+)
+from policies.settings import TrainSettings, job_count
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder
 from teasim.pool import Pool
 from teasim.pool.soundness import require_sound
 
-
-@dataclass(frozen=True)
-class TrainConfig:
-    """What is learned, from which part of the pool."""
-
-    learner: str = "bc"
-    """Name of the learner."""
-    level: str = "subtask"
-    """What is chosen: `subtask` or `joint`."""
-    weights: Path | None = None
-    """Weight table; None: every demonstration counts once."""
-    use: str = "ignore"
-    """How the table is used: `discard`, `weight` or `ignore`."""
-    observe: str = "auto"
-    """What the policy sees: `auto`, `pixels`, `pixels_agent_pos` or `state`."""
-    expert: tuple[int, ...] = ()
-    """Episodes known to be good, for a learner that needs some; empty: the quarter with the largest
-    weights in the table."""
-    seed: int = 0
-    """Seed of the learner."""
-
-
-def _load_motions(pool: Pool, demos: DemosConfig, *, jobs: int) -> MotionSamples:
-    return load_motions(pool, demos.observe, jobs=jobs)
+RECORDED = ("learner", "level", "observe", "camera", "expert", "seed")
+"""Settings that are stored with a policy as they were given."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +36,15 @@ class Level:
     """What a learner of a level is given."""
 
     load: Callable[..., DecisionSamples | MotionSamples]
-    """Reads it: (pool, demos config, jobs) -> samples."""
+    """Reads the samples: (pool, demos config, jobs) -> samples."""
     unit: str
-    """What the rows of the samples are."""
+    """What a row of the samples is, in the plural."""
+
+
+def _load_motions(pool: Pool, demos: DemosConfig, *, jobs: int) -> MotionSamples:
+    if demos.cameras:
+        raise ConfigError("The level 'joint' sees no pictures; leave out --camera.")
+    return load_motions(pool, demos.observe, jobs=jobs)
 
 
 LEVELS: Mapping[str, Level] = MappingProxyType(
@@ -63,70 +55,110 @@ LEVELS: Mapping[str, Level] = MappingProxyType(
 )
 
 
-def train_policy(pool_path: Path, run: Path, config: TrainConfig, *, jobs: int = 1) -> str:
-    """Train on the pool at `pool_path`, save the policy in the new folder `run`, sum up in a line.
+@dataclass(frozen=True)
+class Training:
+    """A policy that was trained and saved; its text is a summary in one line."""
 
-    `run` is made last, so nothing is left behind when the input is bad.
+    policy: AnyPolicy
+    """The policy."""
+    out: Path
+    """Folder it was saved in."""
+    learner: str
+    """Name of the learner."""
+    used: int
+    """Demonstrations with a positive weight."""
+    demos: int
+    """Demonstrations in the pool."""
+    rows: str
+    """How much it learned from, for example `96 decisions`."""
+    loss: float
+    """Last training loss [nat per decision; spreads of a joint target]."""
+    seconds: float
+    """Wall time of reading and learning [s]."""
+
+    def __str__(self) -> str:
+        return (
+            f"{self.learner} on {self.used} of {self.demos} demonstrations, {self.rows}, "
+            f"loss {self.loss:.3f}, {self.seconds:.0f} s -> {self.out}"
+        )
+
+
+def train(settings: TrainSettings) -> Training:
+    """Train a policy on the pool and save it in the new folder `settings.out`.
+
+    The folder is made last, so a bad input leaves nothing behind.
 
     Raises:
-        ConfigError: a name is unknown, the table does not fit the pool, or `run` is in use.
+        ConfigError: a name is unknown, the table does not fit the pool, or the folder is in use.
         PoolError: the pool is missing or damaged.
     """
-    kind = find_learner(config.learner, config.level)
-    demos = DemosConfig(observe=config.observe)
-    pool = Pool.open(pool_path)
+    kind = find_learner(settings.learner, settings.level)
+    options = read_options(settings.learner, kind, parse_assignments(settings.learner_settings))
+    demos = DemosConfig(observe=settings.observe, cameras=settings.camera)
+    pool = Pool.open(settings.pool)
     require_sound(pool)
-    weights = demo_weights(pool, config.weights, config.use)
-    settings = expert_settings(kind, pool, config)
-    check_new_folder(run)
+    weights = demo_weights(pool, settings.weights, settings.chosen_use)
+    options |= provide(kind, pool, settings)
+    check_new_folder(settings.out)
     began = time.perf_counter()
-    level = LEVELS[config.level]
-    samples = level.load(pool, demos, jobs=jobs)
-    learner = kind.make(seed=config.seed, **settings).fit(samples, weights)
-    training = {
-        **asdict(config),
-        "weights": None if config.weights is None else str(config.weights),
+    level = LEVELS[settings.level]
+    samples = level.load(pool, demos, jobs=job_count(settings.jobs))
+    learner = kind.make(seed=settings.seed, **options).fit(samples, weights)
+    record = {
+        **{name: getattr(settings, name) for name in RECORDED},
+        "weights": None if settings.weights is None else str(settings.weights),
+        "use": settings.chosen_use,
         "settings": asdict(learner.config),
         "demo_weights": {e.demo_id: w for e, w in zip(pool.episodes, weights, strict=True)},
         "pool": pool.content_hash(),
         "version": version("teasim"),
         "history": learner.history_,
     }
-    save_policy(learner.policy_, run, training=training)
-    seconds = time.perf_counter() - began
-    return (
-        f"{config.learner} on {int((weights > 0).sum())} of {len(weights)} demonstrations, "
-        f"{len(samples.demos)} {level.unit}, loss {learner.history_[-1]:.3f}, "
-        f"{seconds:.0f} s -> {run}"
+    save_policy(learner.policy_, settings.out, training=record)
+    return Training(
+        policy=learner.policy_,
+        out=settings.out,
+        learner=settings.learner,
+        used=int((weights > 0).sum()),
+        demos=len(weights),
+        rows=f"{len(samples.demos)} {level.unit}",
+        loss=float(learner.history_[-1]),
+        seconds=time.perf_counter() - began,
     )
 
 
-def expert_settings(kind: LearnerKind, pool: Pool, config: TrainConfig) -> dict[str, Any]:
-    """Return the setting `experts`, places in the pool, for a learner that takes it.
+def provide(kind: LearnerKind, pool: Pool, settings: TrainSettings) -> dict[str, Any]:
+    """Return the settings that meet the needs of a learner: `experts`, places in the pool.
 
     Raises:
-        ConfigError: it needs experts and there is no way to choose them, it takes none, or an
+        ConfigError: a need cannot be met, experts are given to a learner that needs none, or an
             episode is not in the pool.
     """
-    if not kind.takes_experts:
-        if config.expert:
-            takers = [name for name, other in LEARNERS.items() if other.takes_experts]
-            raise ConfigError(
-                f"The learner '{config.learner}' takes no --expert; only {', '.join(takers)} does."
-            )
-        return {}
-    if config.expert:
-        return {"experts": places_of(pool, config.expert)}
-    if config.weights is None:
+    if LOG in kind.needs:
+        check_log(pool)
+    if EXPERTS in kind.needs:
+        return {"experts": _experts(pool, settings)}
+    if settings.expert:
         raise ConfigError(
-            f"The learner '{config.learner}' needs demonstrations known to be good; name their "
+            f"The learner '{settings.learner}' takes no --expert; "
+            f"only {', '.join(learners_that_need(EXPERTS))} does."
+        )
+    return {}
+
+
+def _experts(pool: Pool, settings: TrainSettings) -> tuple[int, ...]:
+    if settings.expert:
+        return places_of(pool, settings.expert)
+    if settings.weights is None:
+        raise ConfigError(
+            f"The learner '{settings.learner}' needs demonstrations known to be good; name their "
             "episodes with --expert, or give a weight table with --weights."
         )
-    return {"experts": likely_experts(pool, config.weights)}
+    return likely_experts(pool, settings.weights)
 
 
 def places_of(pool: Pool, episodes: tuple[int, ...]) -> tuple[int, ...]:
-    """Places in `pool` of the episodes with these indexes.
+    """Return the places in `pool` of the episodes with these indexes.
 
     Raises:
         ConfigError: the pool has no such episode.

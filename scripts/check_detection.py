@@ -1,8 +1,8 @@
-"""Find the incorrect demonstrations of many pools drawn from a bank of rendered ones.
+"""Measure detection in many pools drawn from a bank of rendered demonstrations.
 
-The bank is the demonstrations of all POOLs together; each is segmented once, and looked at before
-and after its segments, from its videos alone. Labels of the demonstrations draw the pools and score
-what was found; the filter does not see them.
+The bank consists of the demonstrations of all POOLs. Each is segmented once and compared before and
+after its segments, from its videos alone. Labels of the demonstrations are used only to draw pools
+and to score the result; the filter does not read them.
 """
 
 import argparse
@@ -17,8 +17,9 @@ from filtering.config import FilterConfig
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.judging.baselines import BASELINES
+from filtering.judging.evidence import Evidence
+from filtering.judging.judges import Judgement, by_norm
 from filtering.judging.norm.steps import StepList
-from filtering.judging.verdict import Evidence, Verdict, by_norm
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.vision.frame_features import FrameSource
 from teasim.common.statistics import auroc, wilson_interval
@@ -31,7 +32,7 @@ THREE = (("seq_1", 6), ("seq_2", 4), ("seq_3", 2))
 """The paper's pool of three kinds."""
 USUAL = FilterConfig()
 LEGAL = tuple((before, name) for name, needed in PRECEDENCE.items() for before in needed)
-"""Which sub-task has to come before which."""
+"""Pairs (a, b): a has to come before b."""
 
 
 @dataclass(frozen=True)
@@ -39,42 +40,44 @@ class Demo:
     """A demonstration of the bank."""
 
     spans: tuple[Span, ...]
-    """What the segmenter saw."""
+    """Segments that the segmenter found."""
     changes: np.ndarray | None
-    """(q, F) what each segment changed in the picture."""
+    """(q, F) change of the picture in each segment; None without effects."""
     sequence: str
-    """Order of its sub-tasks, the truth."""
+    """True order of its sub-tasks."""
     mistakes: frozenset[str]
-    """Kinds of its mistakes, the truth."""
+    """True mistakes."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was found in one pool."""
+    """Result of one pool."""
 
-    verdict: Verdict
+    judgement: Judgement
+    """What the filter found."""
     wrong: np.ndarray
+    """(D,) which demonstrations are incorrect."""
 
     @property
     def flagged(self) -> np.ndarray:
-        """(D,) what was flagged."""
-        return self.verdict.grouping.flagged
+        """(D,) True for flagged demonstrations."""
+        return self.judgement.grouping.flagged
 
     @property
     def found(self) -> int:
-        """Wrong ones that were flagged."""
+        """Number of incorrect demonstrations that are flagged."""
         return int((self.flagged & self.wrong).sum())
 
     @property
     def accused(self) -> int:
-        """Right ones that were flagged."""
+        """Number of correct demonstrations that are flagged."""
         return int((self.flagged & ~self.wrong).sum())
 
 
 def bank(
     pools: Iterable[Path], segmenter: str, effects: bool, jobs: int
 ) -> tuple[list[Demo], tuple[str, ...]]:
-    """Look at all demonstrations; return them and the names of the sub-tasks."""
+    """Segment all demonstrations; return them and the names of the sub-tasks."""
     demos: list[Demo] = []
     names: tuple[str, ...] = ()
     for path in pools:
@@ -108,7 +111,7 @@ class Draws:
         config: FilterConfig = USUAL,
         times: int = 1,
     ) -> list[Outcome]:
-        """Draw `count` demonstrations of each sequence; those after the first kind are wrong."""
+        """Draw `count` demonstrations of each sequence; those after the first are incorrect."""
         outcomes = []
         for number in range(times * self.pools):
             rng = np.random.default_rng([row, number])
@@ -126,8 +129,8 @@ class Draws:
         known = Evidence(self.subtasks, tuple(demo.spans for demo in demos))
         changed = [demo.changes for demo in demos if demo.changes is not None]
         if changed:
-            known = replace(known, idle=effect_surprises(changed, known.labels))
-        return Outcome(by_norm(known, config.rule()), wrong)
+            known = replace(known, ineffective=effect_surprises(changed, known.labels))
+        return Outcome(by_norm(known, config), wrong)
 
     def _draw(self, kind: str, count: int, rng: np.random.Generator) -> list[Demo]:
         able = [demo for demo in self.demos if demo.sequence == kind and _plain(demo)]
@@ -150,19 +153,19 @@ def tables(draws: Draws) -> None:
     for groups in ("3", "auto"):
         three = draws.judge(THREE, 20, FilterConfig(groups=groups))
         truth = np.repeat(range(3), [count for _, count in THREE])
-        right = sum(bool((o.verdict.grouping.groups == truth).all()) for o in three)
+        right = sum(bool((o.judgement.grouping.groups == truth).all()) for o in three)
         print(f"6 + 4 + 2, groups {groups}: exactly right in {_share(right, len(three))}")
     clean = draws.judge([("seq_1", 12)], 21, times=2)
     silent = sum(not o.flagged.any() for o in clean)
     print(f"12 seq_1: nothing flagged in {_share(silent, len(clean))}")
-    for name, pairs in (("", ()), (", precedence told", LEGAL)):
+    for name, pairs in (("", ()), (", with precedence", LEGAL)):
         legal = draws.judge([("seq_1", 10), ("legal", 2)], 22, FilterConfig(precedence=pairs))
         accused = sum(o.found for o in legal)
         print(f"10 seq_1 + 2 legal{name}: legal ones flagged {_share(accused, 2 * len(legal))}")
 
 
 def kinds_table(draws: Draws) -> None:
-    """Print how well each kind of mistake is told from correct demonstrations."""
+    """Print how well each mistake is separated from correct demonstrations."""
     kinds = sorted({kind for demo in draws.demos for kind in demo.mistakes})
     correct = [demo for demo in draws.demos if not demo.mistakes]
     areas: dict[str, list[float]] = {kind: [] for kind in kinds}
@@ -174,7 +177,7 @@ def kinds_table(draws: Draws) -> None:
             able = [demo for demo in draws.demos if kind in demo.mistakes]
             pool.append(able[rng.integers(len(able))])
         wrong = np.arange(len(pool)) >= 10
-        losses = draws.outcome(pool, wrong).verdict.losses
+        losses = draws.outcome(pool, wrong).judgement.losses
         for position, kind in enumerate(kinds, start=10):
             chosen = [*range(10), position]
             areas[kind].append(auroc(losses[chosen], wrong[chosen]))
@@ -198,7 +201,7 @@ def _steps(demo: Demo, subtasks: tuple[str, ...]) -> StepList:
 def _print(name: str, outcomes: Sequence[Outcome]) -> None:
     wrong = sum(int(o.wrong.sum()) for o in outcomes)
     found, accused = sum(o.found for o in outcomes), sum(o.accused for o in outcomes)
-    area = np.mean([auroc(o.verdict.losses, o.wrong) for o in outcomes])
+    area = np.mean([auroc(o.judgement.losses, o.wrong) for o in outcomes])
     accuracy = np.mean([(o.flagged == o.wrong).mean() for o in outcomes])
     print(
         f"{name:20} AUROC {area:.3f}  found {_share(found, wrong)}  "
@@ -218,11 +221,11 @@ def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("bank", nargs="+", type=Path, metavar="POOL")
-    parser.add_argument("--segmenter", required=True, help="truth, clustering or a folder")
+    parser.add_argument("--segmenter", required=True, help="logged, clustering or a folder")
     parser.add_argument("--table", choices=TABLES, default="orders")
-    parser.add_argument("--no-effects", action="store_true", help="judge by the steps alone")
+    parser.add_argument("--no-effects", action="store_true", help="use the steps alone")
     parser.add_argument("--pools", type=int, default=30, help="random pools per row")
-    parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
+    parser.add_argument("--jobs", type=int, default=1, help="worker processes")
     arguments = parser.parse_args()
     effects = not arguments.no_effects
     demos, subtasks = bank(arguments.bank, arguments.segmenter, effects, arguments.jobs)

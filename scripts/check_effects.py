@@ -1,7 +1,6 @@
-"""How well effects are read, learned from labels, and how well missing ones are noticed without.
+"""Measure how well ineffective steps are noticed from the videos, without labels of effects.
 
-The labels of the pools are read for learning (TRAIN) and for counting only. Exit code 1 when the
-mean balanced accuracy over the effects is below --at-least.
+The logged segments of the pools are used; labels of mistakes are read only for counting.
 """
 
 import argparse
@@ -11,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.effects.reader import balanced_accuracy, effect_states, fit_effects
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.vision.frame_features import FrameSource
@@ -19,56 +17,32 @@ from teasim.common.parallel import default_jobs
 from teasim.common.statistics import auroc
 from teasim.pool import Pool
 
-INVISIBLE = "stir"
-"""Sub-task whose effect nothing shows at rest; it is printed, but not counted."""
 NOTICED = 2.0
-"""Surprise from which a demonstration counts as noticed [nats]."""
+"""Surprise above which a demonstration counts as noticed [nats]."""
 
 
 def main() -> int:
     """Run the check."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--train", type=Path, help="pool whose labels are learned from")
-    parser.add_argument("--test", type=Path, help="pool in which effects are read")
-    parser.add_argument("--mistakes", type=Path, nargs="*", default=[], help="pools with mistakes")
-    parser.add_argument("--cameras", nargs="+", default=["left", "cup"], help="cameras looked at")
-    parser.add_argument("--at-least", type=float, default=0.0, help="balanced accuracy [percent]")
-    parser.add_argument("--jobs", type=int, default=default_jobs(), help="processes")
+    parser.add_argument("pools", type=Path, nargs="+", metavar="POOL", help="pools with mistakes")
+    parser.add_argument("--cameras", nargs="+", default=["left", "cup"], help="cameras used")
+    parser.add_argument("--jobs", type=int, default=default_jobs(), help="worker processes")
     arguments = parser.parse_args()
     source = FrameSource(tuple(arguments.cameras))
-    for root in arguments.mistakes:
+    for root in arguments.pools:
         notice(Pool.open(root), source, arguments.jobs)
-    if not arguments.train or not arguments.test:
-        return 0
-    pools = Pool.open(arguments.train), Pool.open(arguments.test)
-    return int(100 * read(*pools, source, arguments.jobs) < arguments.at_least)
-
-
-def read(train: Pool, test: Pool, source: FrameSource, jobs: int) -> float:
-    """Print the balanced accuracy of each effect; return their mean."""
-    reader = fit_effects(_rests(train, source, jobs), _names(train), source)
-    said = np.vstack([reader.read(rests) for rests in _rests(test, source, jobs)])
-    truth = np.vstack([effect_states(reader.effects, names)[1:] for names in _names(test)])
-    found = balanced_accuracy(said > 0.5, truth > 0.5)
-    print(f"{train.root.name} -> {test.root.name}, balanced accuracy (expected from its labels) %")
-    for effect, share, expected in zip(reader.effects, found, reader.accuracies, strict=True):
-        until = f" until {effect.undone_by}" if effect.undone_by else ""
-        print(f"  {effect.subtask + until:30}{100 * share:6.1f}  ({100 * expected:.1f})")
-    counted = [effect.subtask != INVISIBLE for effect in reader.effects]
-    mean = float(found[counted].mean())
-    print(f"  mean without {INVISIBLE:17}{100 * mean:6.1f}")
-    return mean
+    return 0
 
 
 def notice(pool: Pool, source: FrameSource, jobs: int) -> None:
-    """Print how surprising the worst segment of demonstrations is, by what is wrong with them."""
+    """Print the largest surprise of demonstrations by their mistakes."""
     names = _names(pool)
     known = sorted({name for done in names for name in done})
     labels = [[known.index(name) for name in done] for done in names]
     rests = _rests(pool, source, jobs)
     worst = np.array([nats.max() for nats in effect_surprises([changes(r) for r in rests], labels)])
     kinds = np.array([_kind(pool, number) for number in range(len(worst))])
-    print(f"{pool.root.name}, worst surprise of a demonstration without a label of an effect, nats")
+    print(f"{pool.root.name}, largest surprise of a demonstration, nats")
     for kind in sorted(set(kinds.tolist())):
         nats = worst[kinds == kind]
         both = kind != "correct" and "correct" in kinds

@@ -24,12 +24,12 @@ from filtering.config import FilterConfig
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import GeneratorConfig
 from filtering.features.erasure import rank_channels
-from filtering.features.extraction import foreground
+from filtering.features.extraction import foreground, segment_maps
 from filtering.features.generator import FeatureGenerator
-from filtering.features.maps import segment_maps
 from filtering.features.pictures import overlay
 from filtering.features.reduction import reduce_features
-from filtering.judging.verdict import Evidence, by_equation_3
+from filtering.judging.evidence import Evidence
+from filtering.judging.judges import by_equation_3
 from filtering.vision.background import BACKGROUNDS
 from filtering.vision.frames import segment_indices
 from teasim.common.statistics import auroc
@@ -136,7 +136,7 @@ def detection(
     every = (_episode_maps(pool, episode, background, arguments) for episode in pool.episodes)
     described = [kinds(maps, bottleneck.transform(maps), generator) for maps in every]
     wrong = np.arange(14) >= 10
-    rule = FilterConfig(score="equation3").rule()
+    rule = FilterConfig(score="equation3")
     for kind in described[0]:
         areas, found, accused = [], 0, 0
         for number in range(arguments.pools):
@@ -150,10 +150,10 @@ def detection(
             ]
             spans = tuple(pool.episodes[index].spans() for index in drawn)
             states = reduce_features([described[index][kind] for index in drawn])
-            verdict = by_equation_3(Evidence(pool.subtasks, spans, states), rule)
-            areas.append(auroc(verdict.losses, wrong))
-            found += int(verdict.grouping.flagged[wrong].sum())
-            accused += int(verdict.grouping.flagged[~wrong].sum())
+            judgement = by_equation_3(Evidence(pool.subtasks, spans, states), rule)
+            areas.append(auroc(judgement.losses, wrong))
+            found += int(judgement.grouping.flagged[wrong].sum())
+            accused += int(judgement.grouping.flagged[~wrong].sum())
         print(
             f"{background:12}{kind:12}equation 3, {arguments.pools} pools of 10 Seq_1 + 4 Seq_3: "
             f"AUROC {np.mean(areas):.3f}, found {found} of {4 * arguments.pools}, "

@@ -1,7 +1,7 @@
-"""Learning curves of PPO in the sub-task environment: from a cloned policy, and from nothing.
+"""Learning curves of PPO in the sub-task environment: from a cloned policy, and from scratch.
 
-POLICY is a folder of `teasim train --observe state`. Both learn in the same few scenes; what was
-done in a scene before is not simulated again. The reward of an episode is 1 when tea was made.
+POLICY is a folder made by `teasim train --observe state`. Both learn in the same few scenes, and a
+sequence of decisions in a scene is simulated once. The reward of an episode is 1 if tea was made.
 """
 
 import argparse
@@ -16,17 +16,17 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 
 from filtering.vision.determinism import one_thread
-from policies.checkpoint import load_policy
+from policies import EnvironmentConfig, load_policy
 from policies.learners.subtask_policy import SubtaskPolicy
+from policies.play.environments import make_environment
 from policies.play.remembering import Remembering
-from policies.play.rollout import EnvironmentConfig, make_environment
 from policies.sb3 import as_ppo
 
 SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "seed": 0}
 
 
 class Scenes(gym.Wrapper[Any, Any, Any, Any]):
-    """Starts some scenes by turns, whatever seed is asked for."""
+    """Resets to a few scenes in turn, whatever seed is given."""
 
     def __init__(self, env: gym.Env[Any, Any], count: int) -> None:
         super().__init__(env)
@@ -38,17 +38,20 @@ class Scenes(gym.Wrapper[Any, Any, Any, Any]):
 
 
 def main() -> int:
-    """Print the mean reward and the mean number of actions of every tenth of the episodes."""
+    """Print the mean reward and the mean length of each tenth of the episodes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("policy", type=Path, help="folder of a cloned policy that sees the state")
-    parser.add_argument("--actions", type=int, default=2000, help="sub-tasks tried by each")
+    parser.add_argument(
+        "--actions", type=int, default=2000, help="actions (sub-tasks) per learning curve"
+    )
     parser.add_argument("--scenes", type=int, default=4, help="number of scenes")
     parser.add_argument("--learning-rate", type=float, default=1e-4, help="step size of PPO")
     arguments = parser.parse_args()
     settings = SETTINGS | {"learning_rate": arguments.learning_rate}
     policy = load_policy(arguments.policy)
-    assert isinstance(policy, SubtaskPolicy)
-    for name in ("cloned", "from nothing"):
+    if not isinstance(policy, SubtaskPolicy):
+        parser.error(f"'{arguments.policy}' holds no policy over sub-tasks.")
+    for name in ("cloned", "from scratch"):
         world = make_environment(EnvironmentConfig(), policy.spec)
         env = Monitor(Scenes(Remembering(world), arguments.scenes))
         with one_thread():

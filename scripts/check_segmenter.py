@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.segmentation.fitting import labelled_videos, least_seconds
+from filtering.segmentation.config import MSTCNConfig
+from filtering.segmentation.fit import labelled_videos, least_seconds
 from filtering.segmentation.metrics import SegmentationScores
-from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
-from filtering.segmentation.mstcn_training import MSTCNConfig, MSTCNLearner
+from filtering.segmentation.mstcn.segmenter import MSTCNSegmenter
+from filtering.segmentation.mstcn.training import MSTCNLearner
 from filtering.segmentation.scoring import score_episodes
 from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource, frame_features
@@ -27,8 +28,11 @@ class Part:
     """Some demonstrations of a pool."""
 
     name: str
+    """Name in the table."""
     pool: Pool
+    """Pool that they belong to."""
     episodes: tuple[Episode, ...]
+    """The demonstrations."""
 
 
 def part(text: str) -> Part:

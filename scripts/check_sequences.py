@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from filtering.judging.baselines import BASELINES
-from filtering.judging.clusters import cut_of
+from filtering.judging.norm.cut import cut_of
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import StepList, count_steps, steps_of_frames
 from filtering.judging.thresholds import probability_incorrect

@@ -64,7 +64,7 @@ def tea_orders(count: int, rng: np.random.Generator) -> list[tuple[int, ...]]:
 def instance(number: int) -> tuple[str, Problem]:
     """Return an instance of 6 to 16 demonstrations; even numbers are like tea, odd ones random.
 
-    Few are large, because a certificate for a large one takes long: D = 6 + floor(11 u^3) for u
+    Few are large, because a certificate for a large one takes long: D = 6 + int(11 u^3) for u
     uniform in [0, 1). Tea: 5 to 7 steps, 3 features. Random: 1 to 3 steps of 2 to 4 sub-tasks, 2
     features, as much noise as there is difference.
     """

@@ -1,1 +1,1 @@
-"""What came of a segment: the video at rest before and after it."""
+"""Effects of segments: the video at rest before and after each one."""

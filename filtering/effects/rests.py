@@ -1,8 +1,7 @@
-"""The video at rest: what it shows before the first segment and after each one.
+"""The video at rest: its features before the first segment and after each one.
 
-Between two segments the hands are away and what was done is in view: a knob that glows, a bag in
-the cup, milk. What is subtracted from it cancels what a video has of its own, its light and its
-camera.
+Between two segments the hands are away and the effects are visible: a glowing knob, a bag in the
+cup, milk. Differences between rests cancel the light and the camera of a video.
 """
 
 from collections.abc import Sequence
@@ -27,20 +26,20 @@ from teasim.pool import Span
 from teasim.pool.source import Clip, Demonstration
 
 REST = 0.3
-"""Moments up to this far from the border of two segments are averaged [s]. Not many: they help
-against noise only while the hands are away."""
+"""Frames up to this far from the border of two segments are averaged [s]; short, because the hands
+soon return."""
 CONSTANT = 0.1
-"""Least scale of a feature [of the median one]; what hardly ever changes must not become noise."""
+"""Least scale of a feature [median scale]; nearly constant features must not become noise."""
 
 
 @dataclass(frozen=True)
 class RestTask:
-    """One video to look at when it is at rest; small, so that it travels to a worker process."""
+    """The frames of one video at rest; small, because it is sent to a worker process."""
 
     clip: Clip
     """Where the frames are."""
     frames: tuple[int, ...]
-    """The frames that are looked at, in order."""
+    """Numbers of the frames, in order."""
     cache_folder: Path
     """Folder of the feature cache."""
 
@@ -48,12 +47,12 @@ class RestTask:
 def rest_features(
     moments: NDArray[np.floating], length: int, spans: Sequence[Span], fps: float
 ) -> NDArray[np.float64]:
-    """Return (q + 1, F): what is seen at rest before the first of q segments and after each.
+    """Return (q + 1, F): features at rest before the first of q segments and after each.
 
     Args:
         moments: (n, F) features of a video, see `frame_features`.
         length: frames of the video.
-        spans: its q segments in order of time [frames]; between them nothing is done.
+        spans: its q segments in order of time [frames].
         fps: frames per second of the video.
     """
     return _means(moments, rest_moments(sampled_frames(length, len(moments)), spans, fps))
@@ -67,7 +66,7 @@ def look_at_rests(
     *,
     jobs: int,
 ) -> list[NDArray[np.float64]]:
-    """Return per demonstration `rest_features` (q + 1, F), looking at no other moments.
+    """Return per demonstration `rest_features` (q + 1, F), computed from these frames alone.
 
     Args:
         episodes: the demonstrations.
@@ -95,7 +94,7 @@ def look_at_rests(
 
 
 def changes(rests: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (q, F): what each of q segments changed, from `rest_features` (q + 1, F)."""
+    """Return (q, F): change of features in each of q segments, from `rest_features` (q + 1, F)."""
     return np.diff(rests, axis=0)
 
 
@@ -110,10 +109,10 @@ def change_scales(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 def rest_moments(
     frames: NDArray[np.int64], spans: Sequence[Span], fps: float
 ) -> list[NDArray[np.int64]]:
-    """Return which moments show the video at rest, before the first of q segments and after each.
+    """Return the sampled frames at rest before the first of q segments and after each.
 
     Args:
-        frames: (n,) the frame of each moment.
+        frames: (n,) numbers of the sampled frames.
         spans: q segments in order of time [frames].
         fps: frames per second.
     """

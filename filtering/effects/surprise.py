@@ -1,18 +1,19 @@
-"""Segments that change less than is usual: all the motion of a sub-task and nothing came of it.
+"""Ineffective steps: segments with the motion of a sub-task that change less than usual.
 
-No label of an effect is needed. The other demonstrations say what a segment of this sub-task
-usually changes after the same sub-tasks, m, the median of their changes, and how changes scatter
-about it, C: sugar in an empty cup is another sight than sugar in tea. A segment's change x has then
+No label of an effect is needed. Segments of the same sub-task after the same sub-tasks in the other
+demonstrations give the usual change m, the median of their changes, and its scatter C. (They must
+follow the same sub-tasks because sugar in an empty cup looks different from sugar in tea.) A change
+x of a segment contains the share
 
-    a = (m' C^-1 x) / (m' C^-1 m)               of the usual effect, 1 when it is there, 0 when not,
+    a = (m' C^-1 x) / (m' C^-1 m)
 
-and with s, the scatter of a in this sub-task, the excess of "nothing came of it", N(0, s^2), over
-"it is as usual", N(1, s^2), in log-likelihood is
+of the usual effect, 1 if it is complete, 0 if it is absent. With s, the scatter of a in this
+sub-task, the log-likelihood ratio of "ineffective", N(0, s^2), to "as usual", N(1, s^2), is
 
     (1 - 2 a) / (2 s^2)    nats, not below 0.
 
-A sub-task without a visible effect has a large s, so that it accuses nobody. Medians everywhere: a
-minority of demonstrations in which it failed does not become what is usual.
+For a sub-task without a visible effect s is large, so the ratio is small. Medians keep a minority
+of ineffective steps from shifting the usual change.
 """
 
 from collections.abc import Sequence
@@ -23,26 +24,25 @@ from sklearn.covariance import ledoit_wolf
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.effects.rests import change_scales
-
-Array = NDArray[np.float64]
+from teasim.common.arrays import Array
 
 COMPONENTS = 32
-"""Most main directions of the pool's changes that are looked at."""
+"""Largest number of principal components of the changes that are used."""
 SPREAD_FLOOR = 0.15
-"""Least scatter of usual effects [usual effects]."""
+"""Least scatter of a [usual effects]."""
 SPREAD_PRIOR, PRIOR_DEMOS = 0.5, 2.0
-"""Scatter that is assumed before any demonstration is seen, and how many it counts for."""
+"""Prior scatter of a [usual effects], and its weight [demonstrations]."""
 FEWEST_OTHERS = 2
-"""With fewer other demonstrations that show a step nobody knows what is usual."""
+"""Least number of other demonstrations from which the usual change is taken."""
 FAR = 2.0
-"""A change that is further off than this many medians counts as this far in the scatter C."""
+"""Deviations are clipped to this many median deviations for the scatter C."""
 
 
 def effect_surprises(changes: Sequence[Array], labels: Sequence[Sequence[int]]) -> list[Array]:
-    """Return per demonstration (q,): how surprising each segment's lack of effect is [nats].
+    """Return per demonstration (q,): how surprising the lack of effect of each segment is [nats].
 
     Args:
-        changes: per demonstration (q, F), what each segment changed, see `rests.changes`.
+        changes: per demonstration (q, F) change of each segment, see `rests.changes`.
         labels: per demonstration the q sub-task labels of its segments, any whole numbers.
     """
     lengths = [len(rows) for rows in changes]
@@ -53,17 +53,17 @@ def effect_surprises(changes: Sequence[Array], labels: Sequence[Sequence[int]]) 
     nats = np.zeros(len(amounts))
     for row in np.flatnonzero(np.isfinite(amounts)):
         others = amounts[(steps == steps[row]) & (demos != demos[row])]
-        # The opposite of the usual effect is no more than none of it.
+        # The opposite of the usual effect counts as no effect.
         nats[row] = (1 - 2 * max(amounts[row], 0.0)) / (2 * _spread(others) ** 2)
     return np.split(np.maximum(nats, 0.0), np.cumsum(lengths)[:-1])
 
 
 def effect_amounts(changes: Array, steps: NDArray[np.int64], demos: NDArray[np.int64]) -> Array:
-    """Return (S,): a, how much of the usual effect each segment had; NaN where none is known.
+    """Return (S,): a, the share of the usual effect in each segment; NaN where it is not known.
 
     Args:
-        changes: (S, K) what the segments of all demonstrations changed.
-        steps: (S,) equal numbers for those that can be compared.
+        changes: (S, K) changes of the segments of all demonstrations.
+        steps: (S,) equal numbers for segments that can be compared.
         demos: (S,) demonstration of each.
     """
     usual = np.full(changes.shape, np.nan)
@@ -79,27 +79,27 @@ def effect_amounts(changes: Array, steps: NDArray[np.int64], demos: NDArray[np.i
         weighted = usual[own] @ _precision((changes - usual)[others])
         strength = (weighted * usual[own]).sum(axis=1)
         seen = (weighted * changes[own]).sum(axis=1)
-        # A sub-task that never changes anything had all of its effect.
+        # A sub-task that never changes anything is always complete.
         amounts[own] = np.divide(seen, strength, out=np.ones(len(seen)), where=strength > 0)
     return amounts
 
 
 def _steps(labels: Sequence[Sequence[int]]) -> NDArray[np.int64]:
-    """Number all segments (S,): equal for one sub-task after the same ones."""
+    """Number all segments (S,): equal for the same sub-task after the same sub-tasks."""
     keys = [(label, frozenset(demo[:k])) for demo in labels for k, label in enumerate(demo)]
     numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
     return np.array([numbers[key] for key in keys], dtype=np.int64)
 
 
 def _main_directions(changes: Array) -> Array:
-    """Return changes (S, F), each feature in its scale over the pool, as (S, K); 0 stays 0."""
+    """Return the principal components (S, K) of scaled changes (S, F); 0 stays 0."""
     left, strength, _ = np.linalg.svd(changes / change_scales(changes), full_matrices=False)
     components: Array = (left * strength)[:, :COMPONENTS]
     return components
 
 
 def _precision(residuals: Array) -> Array:
-    """Return C^-1 (K, K) from deviations (S, K); far ones are drawn in."""
+    """Return C^-1 (K, K) from deviations (S, K), clipped at FAR."""
     norms = np.linalg.norm(residuals, axis=1)
     reach = FAR * np.median(norms)
     if not reach > 0:

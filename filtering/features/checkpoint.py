@@ -108,7 +108,7 @@ def load_features(folder: Path) -> LearnedFeatures:
 
 
 def _restore_generator(description: dict[str, Any], weights: bytes) -> FeatureGenerator:
-    from filtering.features.rgcn import GraphClassifier, GraphNetwork
+    from filtering.features.graphs.rgcn import GraphClassifier, GraphNetwork
 
     stored = description["config"]
     classifier = stored["classifier"]

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 from teasim.common.errors import ConfigError
 
+POOLED = "pooled"
+"""Name of the features without learning: mean and maximum over time of the pretrained network."""
 LAYERS = ("relations", "nodes")
 """Kinds of graph layers: relational ones, or ones that see each node alone."""
 

@@ -1,4 +1,4 @@
-"""Which channels matter: what a decision loses without them (paper section 3.2).
+"""Importance of channels by erasure (paper section 3.2).
 
 Erasure (Li, Monroe, Jurafsky, arXiv:1612.08220): channel k matters to class c as much as the
 classifier's score for c falls when the channel is really taken out of its input,
@@ -15,16 +15,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.features.intervals import Activations, Intervals
+from filtering.features.graphs.intervals import Activations, Intervals
 
-Decision = Callable[[Sequence[Intervals]], NDArray[np.float64]]
+DecisionFunction = Callable[[Sequence[Intervals]], NDArray[np.float64]]
 """A classifier: intervals of S clips to logits (S, T)."""
 
 
 def erasure_importance(
-    decide: Decision, clips: Sequence[Intervals], labels: NDArray[np.int64], channels: int
+    decide: DecisionFunction, clips: Sequence[Intervals], labels: NDArray[np.int64], channels: int
 ) -> NDArray[np.float64]:
-    """Return (T, N): how much each channel matters to each class; N = `channels`.
+    """Return the importance (T, N) of each channel to each class; N = `channels`.
 
     1 means that without the channel nothing speaks for the class any more, 0 that nothing changes,
     below 0 that the class is clearer without it. A class that is never recognised gets 0.

@@ -1,4 +1,4 @@
-"""Frames of a video to one feature vector per segment."""
+"""Frames of segments to pooled features, or to feature maps (paper section 3.2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,20 +14,23 @@ from filtering.vision.frames import Frames, fit_size, segment_indices, uniform_i
 from teasim.pool import Span
 from teasim.pool.source import Clip, Source
 
+Maps = NDArray[np.float16]
+"""Stride-16 feature maps of frames; half precision halves their memory.  # (n, C, h, w)"""
+
 OVERVIEW = 31
-"""Frames spread over the whole video from which its background is learnt."""
+"""Number of frames over the whole video from which its background is estimated."""
 
 
 @dataclass(frozen=True)
 class VideoTask:
-    """One video to describe; small, so that it travels to a worker process."""
+    """One video to describe; small, because it is sent to a worker process."""
 
     clip: Clip
     """Where the frames are."""
     spans: tuple[Span, ...]
     """The segments [frames]."""
     frames_per_segment: int
-    """Most frames looked at in a segment."""
+    """Largest number of frames used per segment."""
     background: str
     """Name of the background subtraction."""
     cache_folder: Path
@@ -43,13 +46,13 @@ def segment_features(
     background: str,
     jobs: int,
 ) -> list[NDArray[np.float32]]:
-    """Return per demonstration (q, F): what each of its segments looks like.
+    """Return per demonstration features (q, F) of its segments.
 
     Args:
         pool: where the videos are.
         segments: the segments of each demonstration.
-        cameras: whose pictures to use; their features are put side by side.
-        frames_per_segment: most frames looked at in a segment.
+        cameras: cameras to use; their features are concatenated.
+        frames_per_segment: largest number of frames used per segment.
         background: name of the background subtraction.
         jobs: worker processes; the result does not depend on it.
 
@@ -91,6 +94,34 @@ def foreground(clip: Clip, indices: NDArray[np.int64], background: str) -> Frame
     )
 
 
+def segment_maps(clip: Clip, spans: tuple[Span, ...], count: int, background: str) -> list[Maps]:
+    """Return per segment the feature maps (n, C, h, w) of at most `count` of its frames.
+
+    Raises:
+        ConfigError: there is no such background subtraction.
+        PoolError: the video is missing or damaged.
+    """
+    indices = segment_indices(spans, count)
+    used = np.unique(np.concatenate(indices))
+    maps = frame_maps(foreground(clip, used, background))
+    return [maps[np.searchsorted(used, chosen)] for chosen in indices]
+
+
+def frame_maps(frames: Frames) -> Maps:
+    """Return the stride-16 feature maps (n, C, h, w) of frames (n, H, W, 3)."""
+    import torch
+
+    from filtering.vision.backbone import BATCH, feature_maps
+    from filtering.vision.determinism import one_thread
+
+    with one_thread(), torch.inference_mode():
+        parts = [
+            feature_maps(frames[first : first + BATCH])[0].numpy().astype(np.float16)
+            for first in range(0, len(frames), BATCH)
+        ]
+    return np.concatenate(parts)
+
+
 def pool_over_time(task: VideoTask, frames: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return (q, 2 * FRAME_FEATURES): mean and maximum over the frames of each segment."""
     indices = _frames_of(task)
@@ -102,7 +133,7 @@ def pool_over_time(task: VideoTask, frames: NDArray[np.float32]) -> NDArray[np.f
 
 
 def _frames_of(task: VideoTask) -> NDArray[np.int64]:
-    """Return the frames that are looked at, each once and in order."""
+    """Return the frames that are used, each once and in order."""
     return np.unique(np.concatenate(segment_indices(task.spans, task.frames_per_segment)))
 
 

@@ -10,12 +10,12 @@ from filtering.features.config import GeneratorConfig
 from teasim.common.errors import ConfigError
 
 if TYPE_CHECKING:
-    from filtering.features.intervals import Activations, Intervals
-    from filtering.features.rgcn import GraphClassifier
+    from filtering.features.graphs.intervals import Activations, Intervals
+    from filtering.features.graphs.rgcn import GraphClassifier
 
 
 class FeatureGenerator:
-    """Finds the channels that tell sub-tasks apart by their intervals, and keeps these.
+    """Selects the channels whose intervals discriminate between sub-tasks.
 
     After `fit`:
         thresholds_ (N,): activation above which a channel is active.
@@ -41,8 +41,8 @@ class FeatureGenerator:
                 number of channels, or more channels are to be kept than there are.
         """
         from filtering.features.erasure import erasure_importance, rank_channels
-        from filtering.features.intervals import mean_thresholds
-        from filtering.features.rgcn import GraphClassifier
+        from filtering.features.graphs.intervals import mean_thresholds
+        from filtering.features.graphs.rgcn import GraphClassifier
         from filtering.features.training import class_labels
 
         numbers, _ = class_labels(labels, len(activations))
@@ -78,7 +78,7 @@ class FeatureGenerator:
         Raises:
             ConfigError: a segment has no frames, or another number of channels than in `fit`.
         """
-        from filtering.features.intervals import find_intervals
+        from filtering.features.graphs.intervals import find_intervals
 
         _check(activations, len(self.thresholds_))
         return [
@@ -99,7 +99,7 @@ class FeatureGenerator:
         return self.decide(self.intervals(activations)).argmax(axis=1)
 
     def _graphs(self, clips: "Sequence[Intervals]") -> list:
-        from filtering.features.graph import interval_graph
+        from filtering.features.graphs.graph import interval_graph
 
         return [interval_graph(clip, len(self.thresholds_)) for clip in clips]
 

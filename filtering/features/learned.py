@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import BottleneckConfig, GeneratorConfig
+from filtering.features.extraction import segment_maps
 from filtering.features.generator import FeatureGenerator
-from filtering.features.maps import segment_maps
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
 from teasim.pool import Span
@@ -22,22 +22,22 @@ from teasim.pool.source import Clip, Demonstration, Source
 
 @dataclass(frozen=True)
 class LookConfig:
-    """What the learned features look at."""
+    """Pictures from which features are learned."""
 
     camera: str
     """Camera whose pictures are used."""
     frames_per_segment: int = 64
-    """Most frames looked at in a segment."""
+    """Largest number of frames used per segment."""
     background: str = "median"
     """Background subtraction: none, median or mog2."""
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedFeatures:
-    """Describes a segment by the channels that tell sub-tasks apart."""
+    """Describes a segment by the channels that discriminate between sub-tasks."""
 
     look: LookConfig
-    """What is looked at."""
+    """Pictures that are used."""
     bottleneck: Bottleneck
     """Feature maps to activations of N channels."""
     generator: FeatureGenerator
@@ -46,7 +46,7 @@ class LearnedFeatures:
     def describe(
         self, pool: Source, segments: Sequence[tuple[Span, ...]], *, jobs: int
     ) -> list[NDArray[np.float64]]:
-        """Return per demonstration (q, N): what each of its segments looks like.
+        """Return per demonstration features (q, N) of its segments.
 
         Args:
             pool: where the videos are.
@@ -66,7 +66,7 @@ class LearnedFeatures:
             _Task(episode.clip(self.look.camera), spans, self)
             for episode, spans in zip(pool.episodes, segments, strict=True)
         ]
-        return parallel.run(_describe, tasks, jobs=jobs, description="looking at segments")
+        return parallel.run(_describe, tasks, jobs=jobs, description="describing segments")
 
 
 def learn_features(
@@ -78,14 +78,14 @@ def learn_features(
     *,
     jobs: int = 1,
 ) -> LearnedFeatures:
-    """Learn from the labelled segments of `episodes`, without settings with the default ones.
+    """Learn from the labelled segments of `episodes`; settings that are None are the defaults.
 
     Raises:
         ConfigError: fewer than two sub-tasks are shown, or a setting is out of range.
         PoolError: a video is missing or damaged.
     """
     tasks = [_MapsTask(episode.clip(look.camera), episode.spans(), look) for episode in episodes]
-    found = parallel.run(_maps, tasks, jobs=jobs, description="looking at labelled segments")
+    found = parallel.run(_maps, tasks, jobs=jobs, description="describing labelled segments")
     clips = [maps for video in found for maps in video]
     labels = [subtasks.index(span.subtask) for task in tasks for span in task.spans]
     reduced = Bottleneck(bottleneck).fit(clips, labels)
@@ -95,16 +95,26 @@ def learn_features(
 
 @dataclass(frozen=True)
 class _MapsTask:
+    """The feature maps of one video."""
+
     clip: Clip
+    """The video."""
     spans: tuple[Span, ...]
+    """Its segments [frames]."""
     look: LookConfig
+    """Frames that are used."""
 
 
 @dataclass(frozen=True)
 class _Task:
+    """The features of one video."""
+
     clip: Clip
+    """The video."""
     spans: tuple[Span, ...]
+    """Its segments [frames]."""
     learned: LearnedFeatures
+    """How they are described."""
 
 
 def _maps(task: _MapsTask) -> list[NDArray[np.float16]]:

@@ -10,7 +10,7 @@ MAX_COMPONENTS = 32
 EXPLAINED = 0.99
 """Share of the pool's variance that the kept components hold, if fewer than the most."""
 CONSTANT = 1e-6
-"""A feature whose standard deviation is below this share of the largest one says nothing."""
+"""Features whose standard deviation is below this share of the largest one are dropped."""
 
 
 def reduce_features(

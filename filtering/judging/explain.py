@@ -1,4 +1,4 @@
-"""One sentence about a demonstration: which step is strange, where in the video, and why."""
+"""One sentence about a flagged demonstration: which step is unusual, where, and why."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,31 +6,31 @@ from dataclasses import dataclass
 from teasim.pool import Span
 
 GRAVE = 0.5
-"""Share of the worst surprise from which a finding may be the one that is named."""
+"""Share of the largest surprise from which a finding may be named first."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Frames as times of the video; as frame numbers where the frame rate is not known."""
+    """Converts frames to times of the video, or to frame numbers where the rate is not known."""
 
     fps: float | None
     """Frames per second."""
 
     @property
     def unit(self) -> str:
-        """What `time` counts."""
+        """Unit of `time`: s or frames."""
         return "frames" if self.fps is None else "s"
 
     def time(self, frame: int) -> float:
-        """Return when a frame begins [unit]."""
+        """Return the time at which a frame begins [unit]."""
         return frame / (self.fps or 1.0)
 
     def at(self, frame: int) -> str:
-        """Return that as words."""
+        """Return the time of a frame in words."""
         return f"frame {frame}" if self.fps is None else f"{self.time(frame):.1f} s"
 
     def during(self, span: Span) -> str:
-        """Return from when to when a segment lasts."""
+        """Return the interval of a segment in words."""
         if self.fps is None:
             return f"frames {span.start}-{span.stop}"
         return f"{self.time(span.start):.1f}-{self.time(span.stop):.1f} s"
@@ -38,31 +38,31 @@ class Clock:
 
 @dataclass(frozen=True)
 class Finding:
-    """One strange place in a demonstration."""
+    """One unusual place in a demonstration."""
 
     expected: str | None
-    """Sub-task that was expected here; None where the end of the video was."""
+    """Sub-task that was expected here; None where the end of the video was expected."""
     seen: str | None
     """Sub-task that was seen instead; None where the video ends."""
     after: Span | None
-    """Segment before; None at the start of the video."""
+    """Segment before this place; None at the start of the video."""
     frame: int
-    """First frame of what was seen, or the frame at which the last segment ends."""
+    """First frame of the sub-task seen, or the frame at which the last segment ends."""
     missing: bool
     """Whether the expected sub-task does not occur anywhere in the demonstration."""
     surprise: float
     """What it adds to the loss [nats]."""
     came: Span | None = None
-    """Where the expected sub-task came instead, later; None where it did not."""
-    idle: Span | None = None
-    """The expected sub-task where it was carried out, but nothing came of it."""
+    """Segment in which the expected sub-task came later; None where it did not."""
+    ineffective: Span | None = None
+    """Segment of the expected sub-task when it was carried out without effect; else None."""
 
 
 def explain(findings: Sequence[Finding], fps: float | None) -> str:
-    """Return one sentence about the first finding, and what else is missing.
+    """Return one sentence about the first finding and all other missing sub-tasks.
 
     Args:
-        findings: of one demonstration, the one to name first.
+        findings: of one demonstration, the most important one first.
         fps: frames per second; None where it is not known.
     """
     if not findings:
@@ -72,8 +72,9 @@ def explain(findings: Sequence[Finding], fps: float | None) -> str:
         )
     clock = Clock(fps)
     named = findings[0]
-    if named.idle is not None:
-        sentence = f"{named.expected} was seen ({clock.during(named.idle)}), but nothing came of it"
+    if named.ineffective is not None:
+        when = clock.during(named.ineffective)
+        sentence = f"'{named.expected}' was carried out ({when}), but it had no visible effect"
     else:
         sentence = f"{_place(named, clock)} {_expectation(named)}, {_sight(named, clock)}"
     if named.missing:

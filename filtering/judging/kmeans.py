@@ -5,17 +5,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from teasim.common.arrays import Array
 
 
 def kmeans(values: Array, count: int) -> NDArray[np.int64]:
-    """Return the cluster of each of the values (n,), 0 for the lowest.
+    """Return the cluster (n,) of each value, 0 for the lowest.
 
-    The sum of squares within is the least there is. Equal values share a cluster; there are fewer
-    clusters when there are fewer different values.
+    The sum of squares within the clusters is minimal. Equal values share a cluster; there are
+    fewer clusters when there are fewer different values.
 
     Args:
-        values: any numbers, one or more.
+        values: (n,) one or more finite numbers.
         count: number of clusters, 1, 2 or 3.
     """
     distinct, numbers = np.unique(values, return_counts=True)
@@ -30,7 +30,7 @@ def clusters(values: Array, count: int) -> list[Array]:
 
 
 def _best_cuts(values: Array, counts: Array, groups: int) -> tuple[int, ...]:
-    """Return where to cut the sorted distinct `values` for the least sum of squares within."""
+    """Return where to cut the sorted distinct `values` (n,) so that the sum of squares is least."""
     centred = values - np.average(values, weights=counts)
     number, first, second = (
         np.concatenate([[0.0], np.cumsum(counts * centred**power)]) for power in range(3)

@@ -1,10 +1,8 @@
 """From weights to groups: clusters and the mid-points between them (paper section 3.3).
 
-k-means is exact, because it is one-dimensional; a Gaussian mixture and mini-batch k-means are there
-as the paper has them.
-
-The paper is told the number of groups. Here it can also be chosen from the data, one group
-included: in a clean pool nothing is flagged.
+k-means is solved exactly, because it is one-dimensional; the Gaussian mixture and mini-batch
+k-means are those of the paper. In the paper the number of groups is given. Here it can also be
+chosen from the data; one group is possible, so that nothing is flagged in a clean pool.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,20 +18,21 @@ from teasim.common.errors import ConfigError
 from teasim.common.registry import named
 
 GROUPS = ("auto", "1", "2", "3")
-"""What may be asked for."""
+"""Numbers of groups that can be asked for."""
 MIN_GAP = 0.5
-"""Least distance between the mean weights of two groups for them to be two [weight]."""
+"""Least distance between the mean weights of two groups [weight]. Set by judgement: half of the
+range of weights."""
 MIN_GAP_OF_THREE = 0.25
-"""Least distance between neighbouring means of three groups [weight]."""
+"""Least distance between neighbouring means of three groups [weight]. Half of MIN_GAP."""
 
 DIGITS = 9
-"""Weights and losses that agree to so many decimal places are equal."""
+"""Decimal places to which weights and losses are compared."""
 LEAST_VARIANCE = 1e-4
 """Least variance of a group of weights."""
 LEAST_ROOT_VARIANCE = 0.05
-"""Least variance of a group of sqrt(l) [nats]: a twentieth of a nat is no difference."""
+"""Least variance of a group of sqrt(loss) [nats]; smaller differences are noise."""
 NO_SPREAD = 1e-6
-"""Values of sqrt(l) that differ by less are equal."""
+"""Values of sqrt(loss) that differ by less are equal [sqrt(nats)]."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +42,9 @@ class Grouping:
     groups: NDArray[np.int64]
     """(D,) group of each demonstration; 0 has the highest weights and is kept."""
     threshold: float
-    """Weight below which a demonstration is flagged; 0 when there is one group."""
+    """Weight below which a demonstration is flagged; 0 when none was found or asked for."""
     names: tuple[str, ...] = ()
-    """What the groups have in common, in words; empty where only the weights tell."""
+    """What the groups have in common, in words; empty where only the weights define them."""
 
     @property
     def flagged(self) -> NDArray[np.bool_]:
@@ -59,20 +58,22 @@ class Grouping:
 
 
 def group_weights(
-    weights: NDArray[np.float64], groups: str = "auto", method: str = "kmeans"
+    weights: NDArray[np.float64], groups: str = "auto", method: float | str = "kmeans"
 ) -> Grouping:
     """Split weights (D,) into groups and put the threshold between group 0 and group 1.
 
-    Asked-for groups are fewer when there are fewer different weights than groups.
+    There are fewer groups than asked for when there are fewer different weights.
 
     Args:
-        weights: in [0, 1].
-        groups: one of GROUPS.
-        method: one of METHODS.
+        weights: (D,) in [0, 1].
+        groups: one of GROUPS; not used with a number as `method`.
+        method: one of METHODS, or the threshold itself.
 
     Raises:
         ConfigError: `groups` or `method` is unknown, or there are fewer demonstrations than groups.
     """
+    if not isinstance(method, str):
+        return Grouping((weights < method).astype(np.int64), float(method))
     grouper = method_named(method)
     if groups not in GROUPS:
         raise ConfigError(f"Unknown number of groups '{groups}'; choose {', '.join(GROUPS)}.")
@@ -88,7 +89,7 @@ def group_weights(
 
 
 Grouper = Callable[[NDArray[np.float64], int], Grouping]
-"""Splits weights (D,) into so many groups, fewer where a group would be empty."""
+"""Splits weights (D,) into a number of groups, fewer where a group would be empty."""
 
 
 def _chosen_from_data(weights: NDArray[np.float64], grouper: Grouper) -> Grouping:
@@ -101,7 +102,7 @@ def _chosen_from_data(weights: NDArray[np.float64], grouper: Grouper) -> Groupin
     three = grouper(weights, 3)
     clear = _smallest_gap(weights, three) >= MIN_GAP_OF_THREE
     better = _silhouette(weights, three) > _silhouette(weights, two)
-    # A third group may refine what is flagged, but must not take demonstrations from the kept ones.
+    # A third group may refine the flagged ones, but must not take any from the kept ones.
     same_kept = np.array_equal(two.flagged, three.flagged)
     return three if clear and better and same_kept else two
 
@@ -112,7 +113,7 @@ def _by_kmeans(weights: NDArray[np.float64], count: int) -> Grouping:
     if count == 1:
         return Grouping(groups, 0.0)
     middle = (weights[groups == 0].mean() + weights[groups == 1].mean()) / 2
-    # The mid-point of the means may fall inside a wide group; the groups decide: keep it between.
+    # The mid-point of the means may lie inside a wide group: keep it between the groups.
     lowest_kept, highest_flagged = weights[groups == 0].min(), weights[groups == 1].max()
     inside = highest_flagged < middle <= lowest_kept
     return Grouping(groups, float(middle if inside else (lowest_kept + highest_flagged) / 2))
@@ -140,7 +141,7 @@ def _kmeans_means(weights: NDArray[np.float64], count: int) -> NDArray[np.float6
 
 
 def _between(weights: NDArray[np.float64], means: NDArray[np.float64]) -> Grouping:
-    """Cut at the mid-points of the means; a group that nobody is in is none."""
+    """Cut at the mid-points of the means; empty groups are dropped."""
     falling = np.sort(means)[::-1]
     middles = (falling[1:] + falling[:-1]) / 2
     below: NDArray[np.bool_] = weights[:, None] < middles[None, :]
@@ -153,26 +154,27 @@ def _between(weights: NDArray[np.float64], means: NDArray[np.float64]) -> Groupi
 METHODS: Mapping[str, Grouper] = MappingProxyType(
     {"kmeans": _by_kmeans, "gmm": _by_mixture, "minibatch": _by_minibatch}
 )
-"""Every way of finding groups by name."""
+"""Every method of finding groups by name."""
 
 
 def method_named(name: str) -> Grouper:
-    """Return a way of finding groups.
+    """Return a method of finding groups.
 
     Raises:
-        ConfigError: there is none of that name.
+        ConfigError: there is no method of that name.
     """
     return named("threshold", METHODS, name)
 
 
 def probability_incorrect(losses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return for losses (D,) how probable it is that each demonstration is incorrect.
+    """Return (D,) the probability that each demonstration is incorrect, for losses (D,).
 
-    Two Gaussians of one variance are fitted to sqrt(l), beside a single one. The probability is
-    that of the upper one given l, times that of there being two at all, by their BIC. Like the
-    losses it takes what few do for incorrect; it is calibrated as far as both are Gaussian.
+    A mixture of two Gaussians of equal variance and a single Gaussian are fitted to sqrt(loss). The
+    probability is that of the upper component, times the probability by BIC that there are two
+    components. Like the losses it treats rare behaviour as incorrect; it is calibrated as far as
+    the components are Gaussian.
     """
-    from sklearn.mixture import GaussianMixture  # only here: importing it takes a second
+    from sklearn.mixture import GaussianMixture  # importing it takes a second
 
     roots = np.sort(np.sqrt(np.maximum(losses, 0)))[:, None]
     if np.ptp(roots) < NO_SPREAD:
@@ -198,7 +200,7 @@ def _smallest_gap(weights: NDArray[np.float64], grouping: Grouping) -> float:
 
 
 def _silhouette(weights: NDArray[np.float64], grouping: Grouping) -> float:
-    """Return the mean silhouette; a demonstration alone in its group counts 0, as is the custom."""
+    """Return the mean silhouette; one alone in its group counts 0, as in scikit-learn."""
     sizes = np.bincount(grouping.groups)
     sums = np.stack(
         [_distance_sums(weights, weights[grouping.groups == g]) for g in range(len(sizes))], axis=1
@@ -215,7 +217,7 @@ def _silhouette(weights: NDArray[np.float64], grouping: Grouping) -> float:
 def _distance_sums(
     weights: NDArray[np.float64], members: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return (D,): sum of the distances of each weight to all members of a group."""
+    """Return (D,): sum of the distances of each weight to all members of a group (n,)."""
     members = np.sort(members)
     below = np.concatenate([[0.0], np.cumsum(members)])
     place = np.searchsorted(members, weights)

@@ -1,4 +1,4 @@
-"""Where things go on the page: dots of the strip plot, marks above a timeline."""
+"""Positions on the page: dots of the strip plot, marks above a timeline."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 DOT_WIDTH = 0.022
 """Width of a dot [weight]; dots closer than that are stacked."""
 MARK_WIDTH = 22.0
-"""Room that the text of a mark takes [% of the timeline]."""
+"""Width of the text of a mark [% of the timeline]."""
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,12 @@ class Dot:
 
 @dataclass(frozen=True)
 class Mark:
-    """A strange place on a timeline."""
+    """An unusual place on a timeline."""
 
     second: float
-    """Where it is [s]."""
+    """Its time [unit of the page]."""
     text: str
-    """What is strange there, in two to four words."""
+    """Why it is unusual, in two to four words."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class PlacedMark:
     mark: Mark
     """The mark."""
     turned: bool
-    """Whether the text stands left of the place, because there is no room on its right."""
+    """Whether the text is left of the mark, because it does not fit on the right."""
 
 
 def place_dots(weights: Sequence[float]) -> list[Dot]:

@@ -31,19 +31,19 @@ GOLDEN_ANGLE = 137.508
 
 @dataclass(frozen=True)
 class Segment:
-    """A coloured stretch of a timeline."""
+    """A coloured segment of a timeline."""
 
     subtask: str
     """Its name."""
     start: float
-    """Where it starts [unit of the page]."""
+    """Start [unit of the page]."""
     stop: float
-    """Where it stops [unit of the page]."""
+    """End [unit of the page]."""
 
 
 @dataclass(frozen=True)
 class DemoView:
-    """What the page says about one demonstration."""
+    """What the page shows of one demonstration."""
 
     episode_index: int
     """Its number in the pool."""
@@ -54,9 +54,9 @@ class DemoView:
     loss: float
     """Surprise [nats]."""
     flagged: bool
-    """Whether it is called incorrect."""
+    """Whether it is flagged as incorrect."""
     group: str
-    """What its group has in common, empty where only the weights tell."""
+    """What its group has in common, empty where only the weights define it."""
     reason: str
     """One sentence, empty for a kept demonstration."""
     seconds: float
@@ -64,7 +64,7 @@ class DemoView:
     segments: tuple[Segment, ...]
     """Its timeline."""
     marks: tuple[Mark, ...] = ()
-    """Strange places."""
+    """Unusual places."""
     video: bytes | None = None
     """The mp4 that is shown, None for none."""
     name: str = ""
@@ -78,7 +78,7 @@ class ReportSection:
     title: str
     """Heading."""
     html: str
-    """Trusted HTML, put on the page as it is."""
+    """Trusted HTML, inserted without escaping."""
 
 
 def render_report(
@@ -96,13 +96,13 @@ def render_report(
 
     Args:
         path: the HTML file, replaced if it is there.
-        demos: what is shown, in any order.
-        threshold: weight below which a demonstration is flagged, 0 when nothing is.
-        subtasks: names in the order of their colours; empty means as they occur.
+        demos: the demonstrations, in any order.
+        threshold: weight below which a demonstration is flagged; 0 when there is none.
+        subtasks: names in the order of their colours; empty means in alphabetical order.
         title: heading of the page.
         summary: a line under the heading; empty means the number of flagged videos.
-        sections: what other packages add.
-        unit: what times are counted in, s or frames.
+        sections: further sections.
+        unit: unit of times, s or frames.
 
     Raises:
         TeasimError: the file cannot be written.
@@ -158,7 +158,7 @@ def _colour(number: int) -> str:
 
 
 def _spoken(text: str) -> str:
-    """Show sub-task names as words."""
+    """Return the name of a sub-task as words."""
     return text.replace("_", " ")
 
 

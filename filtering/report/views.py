@@ -1,4 +1,4 @@
-"""From a fitted filter and its pool to what the page shows."""
+"""The views of the page from a fitted filter and its pool."""
 
 import tempfile
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
 
 
 def marks_of(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
-    """Mark what is missing and the gravest of the rest; echoes of those would only confuse."""
+    """Mark what is missing and the largest other findings; smaller ones follow from those."""
     if not findings:
         return ()
     grave = gravest(findings)
@@ -55,8 +55,8 @@ def marks_of(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
 
 
 def _mark(finding: Finding, clock: Clock) -> Mark:
-    if finding.idle is not None:
-        text = f"nothing came of {finding.idle.subtask}"
+    if finding.ineffective is not None:
+        text = f"{finding.ineffective.subtask} was ineffective"
     elif finding.expected is None:
         text = "the end was expected"
     else:
@@ -65,7 +65,7 @@ def _mark(finding: Finding, clock: Clock) -> Mark:
 
 
 def _mp4_of(clip: Clip, fps: float) -> bytes:
-    """Return the clip as an mp4 of its own; what no browser plays as it is is encoded anew."""
+    """Return the clip as an mp4; formats that browsers do not play are encoded again."""
     stored = clip.mp4()
     if stored is not None:
         return stored

@@ -1,8 +1,8 @@
-"""Segments of a pool nobody labelled: the videos are compared with each other.
+"""The segmenter `clustering`: segments of a pool without labels.
 
-Only how the pictures of one camera look is used (the average of the finer feature map), scaled
-within each video, so that camera and light do not matter. What `discovery` finds in them gets the
-names step 1, step 2, ... in the usual order of first occurrence.
+It uses the average of the finer feature map of one camera, scaled within each video to remove the
+influence of camera and light. The sub-tasks found by `discovery` are named step 1, step 2, ... in
+the usual order of first occurrence.
 """
 
 from collections.abc import Sequence
@@ -20,24 +20,24 @@ from teasim.common.errors import ConfigError
 from teasim.pool.source import Demonstration, Source
 
 AUTO = "auto"
-"""Number of sub-tasks that means: find it out."""
+"""Value of the option `subtasks` that infers the number."""
 RATE = 5.0
-"""Moments looked at per second [Hz]; with half as many, short sub-tasks in videos without rests are
-joined to others, because each of them is seen as a row of stages."""
+"""Frames used per second [Hz]; with half of it, short sub-tasks are merged with others in videos
+without rests, because each sub-task is a sequence of stages."""
 AVERAGES = 112
-"""Features of a camera that are used, the first of its block: averages of the stride-16 map."""
+"""Number of features per camera: the averages of the stride-16 map, first in its block."""
 
 
 def clustering(
     pool: Source, *, jobs: int = 1, subtasks: int | None = None, cameras: tuple[str, ...] = ()
 ) -> Segmentation:
-    """Find sub-tasks that the demonstrations of a pool have in common; labels are not read.
+    """Find the sub-tasks that the demonstrations of a pool share; labels are not read.
 
     Args:
-        pool: two demonstrations or more.
-        jobs: worker processes that look at videos; the result does not depend on it.
-        subtasks: how many to look for; None to find that out.
-        cameras: whose pictures are compared; empty means the main one.
+        pool: two or more demonstrations.
+        jobs: number of worker processes; the result does not depend on it.
+        subtasks: number of sub-tasks; None infers it.
+        cameras: cameras to use; empty means the main one.
 
     Raises:
         ConfigError: the videos are too few or too short, or there is no such camera.
@@ -46,18 +46,18 @@ def clustering(
     if len(pool.episodes) < 2:
         raise ConfigError(
             f"The pool '{pool.root}' has {len(pool.episodes)} demonstrations; the segmenter "
-            "'clustering' compares two or more."
+            "'clustering' needs two or more."
         )
     source = FrameSource(chosen_cameras(pool, cameras) or (main_camera(pool),), RATE)
-    # The order of the demonstrations in the pool must not matter, not even to rounding.
+    # Sorted, so that the order of the pool does not even change rounding.
     order = sorted(range(len(pool.episodes)), key=lambda number: pool.episodes[number].demo_id)
     episodes = [pool.episodes[number] for number in order]
     videos = looks(episodes, frame_rate(pool), source, jobs=jobs)
     longest = max(map(len, videos))
     if subtasks is not None and subtasks > longest:
         raise ConfigError(
-            f"{subtasks} sub-tasks were asked for but the longest video of the pool "
-            f"'{pool.root}' is looked at only {longest} times; choose fewer."
+            f"{subtasks} sub-tasks were asked for, but the longest video of the pool "
+            f"'{pool.root}' gives only {longest} frames to compare; choose fewer."
         )
     with threadpool_limits(limits=1, user_api="blas"):  # sums get one order
         found = discover(videos, subtasks)
@@ -76,7 +76,7 @@ def clustering(
 def looks(
     episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, jobs: int
 ) -> list[NDArray[np.float64]]:
-    """Return per demonstration (n, F) what is compared, each feature scaled within its video."""
+    """Return per demonstration features (n, F), each scaled within its video."""
     width = len(source.cameras)
     videos = []
     for moments in frame_features(episodes, fps, source, jobs=jobs):
@@ -86,10 +86,10 @@ def looks(
 
 
 def subtask_count(text: str) -> int | None:
-    """Return the number of sub-tasks that an option names, None for AUTO.
+    """Return the number of sub-tasks that the option gives, None for AUTO.
 
     Raises:
-        ConfigError: it is neither.
+        ConfigError: it is neither AUTO nor a number.
     """
     if text == AUTO:
         return None

@@ -1,10 +1,10 @@
-"""Which sub-tasks the videos of a pool have in common, how many, and where: no label is read.
+"""Discovery of the sub-tasks that the videos of a pool share; no label is read.
 
-Many videos show the same few things, mostly once each, in different orders. So the parts of one
-video (TW-FINCH) are a first model of all: every video is segmented with it, its segments are
-matched one-to-one to the sub-tasks, the sub-tasks are averaged anew over all videos, and so on
-(hard EM). The start that explains the pool best wins. The number of sub-tasks is that beyond which
-one more explains next to nothing: log(unexplained variance) + SMALLEST_GAIN * T is least.
+Many videos show the same few sub-tasks, mostly once each, in different orders. The parts of one
+video (TW-FINCH) initialise the model; then every video is segmented with it, its segments are
+matched one-to-one to the sub-tasks, and the sub-tasks are averaged over all videos, until nothing
+changes (hard EM). Of several starts, the one that explains the pool best is kept. The number T of
+sub-tasks minimises log(unexplained variance) + SMALLEST_GAIN * T.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,26 +23,26 @@ from filtering.segmentation.stage_model import (
     probabilities,
 )
 from filtering.segmentation.twfinch import partition
+from teasim.common.arrays import Array
 from teasim.pool.types import runs
 
-Array = NDArray[np.float64]
-
 MOST_SUBTASKS = 12
-"""Most that are looked for when nobody says how many there are."""
+"""Largest number of sub-tasks that is tried when it is inferred."""
 MOST_STAGES = 10
-"""Most stages of a sub-task; videos of few moments have fewer, so that MOST_SUBTASKS fit in."""
+"""Largest number of stages of a sub-task; short videos have fewer, so that MOST_SUBTASKS fit."""
 SMALLEST_GAIN = 0.035
-"""Share of the unexplained variance that a further sub-task has to explain."""
+"""Share of the unexplained variance that a further sub-task has to explain. Chosen on rendered tea
+pools, see docs/results.md."""
 PATIENCE = 3
-"""So many numbers of sub-tasks in a row without gain end the search."""
+"""Number of consecutive values of T without gain after which the search ends."""
 STARTS = 4
-"""Starts that are followed to the end, the best of all at first sight."""
+"""Number of starts that are refined: those of least error after one step."""
 SPARE_PARTS = (0, 2)
-"""Parts a video is cut into beyond the sub-tasks; the longest are taken for a start."""
+"""Parts into which a video is cut beyond T; the T longest parts make a start."""
 ROUNDS = 12
-"""Most times the model is averaged anew."""
+"""Largest number of iterations of a refinement."""
 TINY = 1e-12
-"""Variance of videos in which nothing happens [variance of a feature]."""
+"""Variance added before the logarithm, for videos without change [variance of a feature]."""
 
 
 @dataclass(frozen=True)
@@ -50,22 +50,23 @@ class Discovery:
     """The sub-tasks of a pool, in the usual order of their first occurrence."""
 
     labels: tuple[NDArray[np.int64], ...]
-    """Per video (n,): sub-task of each moment, 0..T-1."""
+    """Per video (n,): sub-task at each sampled frame, 0..T-1."""
     posteriors: tuple[Array, ...]
-    """Per video (n, T): how probable each sub-task is at each moment."""
+    """Per video (n, T): probability of each sub-task at each sampled frame."""
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """A model and how it explains the videos."""
+    """A model with its fit to the videos."""
 
     model: StageModel
+    """The sub-tasks."""
     errors: Array
     """(D, n, T, L) squared distances."""
     states: States
-    """(D, n), those of least error."""
+    """(D, n) states of least error."""
     error: float
-    """Their sum."""
+    """Sum of the errors of these states."""
 
     def cost(self) -> float:
         """Return log(unexplained variance) + SMALLEST_GAIN * T; the least is best."""
@@ -80,8 +81,7 @@ def discover(videos: Sequence[Array], subtasks: int | None = None) -> Discovery:
 
     Args:
         videos: per video (n, F) features, each feature's mean over the video taken out.
-        subtasks: how many to look for; None to find that out. Those that no video turns out to
-            show are left out.
+        subtasks: their number; None infers it. Sub-tasks that no video shows are dropped.
     """
     stages = stage_count([len(video) for video in videos], subtasks)
     kept = [_stretched(len(video), stages) for video in videos]
@@ -100,28 +100,28 @@ def discover(videos: Sequence[Array], subtasks: int | None = None) -> Discovery:
 
 
 def stage_count(lengths: Sequence[int], subtasks: int | None = None) -> int:
-    """Return L, so many stages that the usual video has room for all sub-tasks.
+    """Return L, the number of stages at which a video of median length can hold all sub-tasks.
 
     Args:
         lengths: moments of each video.
-        subtasks: how many are looked for, if that is known.
+        subtasks: number of sub-tasks, if it is given.
     """
-    room = int(np.median(lengths)) // max(subtasks or 0, MOST_SUBTASKS)
-    return min(max(room, 1), MOST_STAGES)
+    fitting = int(np.median(lengths)) // max(subtasks or 0, MOST_SUBTASKS)
+    return min(max(fitting, 1), MOST_STAGES)
 
 
 def most_subtasks(lengths: NDArray[np.int64], stages: int) -> int:
-    """Return how many sub-tasks videos of these moments can tell about, 1..MOST_SUBTASKS."""
+    """Return the largest number of sub-tasks that videos of these lengths support."""
     return int(np.clip(lengths.sum() // (2 * stages), 1, min(lengths.max(), MOST_SUBTASKS)))
 
 
 def _stretched(length: int, least: int) -> NDArray[np.int64]:
-    """Return the moments of a video, some of them more than once where it has too few."""
+    """Return the sampled frames of a video; some are repeated if there are fewer than `least`."""
     return np.arange(length) if length >= least else np.arange(least) * length // least
 
 
 def _best_number(videos: Videos, stages: int) -> _Fit:
-    """Return the fit whose number of sub-tasks costs least, of 1, 2, ..."""
+    """Return the fit of least cost over the numbers of sub-tasks 1, 2, ..."""
     best = _best_fit(videos, 1, stages)
     for subtasks in range(2, most_subtasks(videos.lengths, stages) + 1):
         fit = _best_fit(videos, subtasks, stages)
@@ -132,14 +132,14 @@ def _best_number(videos: Videos, stages: int) -> _Fit:
 
 
 def _best_fit(videos: Videos, subtasks: int, stages: int) -> _Fit:
-    """Follow the best starts and return the fit of least error."""
+    """Refine the best starts and return the fit of least error."""
     starts = [_fit(videos, model) for model in _starts(videos, subtasks, stages)]
     starts.sort(key=lambda fit: fit.error)
     return min((_refined(videos, fit) for fit in starts[:STARTS]), key=lambda fit: fit.error)
 
 
 def _starts(videos: Videos, subtasks: int, stages: int) -> Iterator[StageModel]:
-    """Yield the longest parts of every video as sub-tasks, where it has that many."""
+    """Yield a start from the longest parts of every video that has enough of them."""
     for moments, length in zip(videos.moments, videos.lengths, strict=True):
         video = moments[:length]
         for spare in SPARE_PARTS:
@@ -175,12 +175,12 @@ def _usual_order(labels: NDArray[np.int64], lengths: NDArray[np.int64]) -> list[
 
 
 def _nats_per_error(videos: Videos, fit: _Fit) -> float:
-    """Return what a unit of error costs, so that features and moments that agree count once.
+    """Return the nats per unit of error, corrected for correlated features and frames.
 
-    Errors of different features and of neighbouring moments are much alike. So the squared distance
-    is scaled to as many features as vary on their own, (sum of the eigenvalues)^2 / sum of their
-    squares for the errors' covariance, and divided by the moments for which an error lasts,
-    (1 + r) / (1 - r) at an autocorrelation r from one moment to the next.
+    Errors of different features and of neighbouring frames are correlated. The squared distance is
+    scaled to the effective number of features, (sum of the eigenvalues)^2 / sum of their squares
+    for the covariance of the errors, and divided by the correlation time of the errors,
+    (1 + r) / (1 - r) at an autocorrelation r between neighbouring frames.
     """
     flat = fit.model.means.reshape(-1, fit.model.means.shape[-1])
     left = np.where((fit.states == NOWHERE)[..., None], 0.0, videos.moments - flat[fit.states])

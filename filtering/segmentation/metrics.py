@@ -1,4 +1,4 @@
-"""How good a segmentation is: the published measures of action segmentation, and the paper's.
+"""Measures of a segmentation: those of the literature on action segmentation, and the paper's.
 
 Frame accuracy, edit score and F1@k (Lea et al., ECCV 2016 and CVPR 2017) are computed over a set of
 videos as the evaluation program of MS-TCN does it: accuracy over all frames, F1 from hits counted
@@ -27,7 +27,7 @@ Labels = NDArray[np.integer]
 
 @dataclass(frozen=True)
 class LabelPair:
-    """What a video shows and what a segmenter says."""
+    """True and predicted labels of a video."""
 
     truth: Labels
     """(n,) true label of each frame."""
@@ -89,14 +89,13 @@ def edit_score(pair: LabelPair) -> float:
 
 def levenshtein(first: Sequence[int], second: Sequence[int]) -> int:
     """Return the fewest insertions, deletions and replacements that turn one into the other."""
-    row = list(range(len(second) + 1))
-    for i, label in enumerate(first, start=1):
-        diagonal, row[0] = row[0], i
-        for j, other in enumerate(second, start=1):
-            replaced = diagonal + (label != other)
-            diagonal = row[j]
-            row[j] = min(replaced, row[j] + 1, row[j - 1] + 1)
-    return row[-1]
+    row = np.arange(len(second) + 1)
+    labels, columns = np.array(second), np.arange(len(second) + 1)
+    for number, label in enumerate(first, start=1):
+        changed = np.append(number, np.minimum(row[1:] + 1, row[:-1] + (labels != label)))
+        # An insertion adds 1 to the left neighbour: a running minimum of what exceeds the column.
+        row = np.minimum.accumulate(changed - columns) + columns
+    return int(row[-1])
 
 
 def f1_score(pairs: Sequence[LabelPair], overlap: int) -> float:

@@ -1,4 +1,4 @@
-"""How good the segments of a pool are, where their truth was logged."""
+"""Measures of the segments of a pool whose true segments were logged."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -19,16 +19,16 @@ from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder
 from teasim.pool.source import Demonstration
 from teasim.pool.types import index_from_spans
 
+ScoresByPart = dict[str, SegmentationScores]
+"""Measures by UNSEEN and LABELLED."""
 UNSEEN = "unseen"
-"""Demonstrations whose labels the segmenter did not have: those that count."""
+"""Demonstrations whose labels the segmenter did not use."""
 LABELLED = "labelled"
 """Demonstrations that the segmenter was fitted to."""
 
 
-def score_episodes(
-    episodes: Sequence[Demonstration], found: Segmentation
-) -> dict[str, SegmentationScores]:
-    """Return scores by UNSEEN and LABELLED; a part without known truth is left out.
+def score_episodes(episodes: Sequence[Demonstration], found: Segmentation) -> ScoresByPart:
+    """Return the measures of each part; a part without logged segments is left out.
 
     Args:
         episodes: the demonstrations that were segmented.
@@ -45,8 +45,8 @@ def score_episodes(
     return {part: segmentation_scores(pairs) for part, pairs in parts.items() if pairs}
 
 
-def scores_table(scores: dict[str, SegmentationScores]) -> str:
-    """Return the scores as lines of text, one per part, [%]."""
+def scores_table(scores: ScoresByPart) -> str:
+    """Return the measures as lines of text, one per part [%]."""
     heads = ["videos", "accuracy", "edit"]
     heads += [f"F1@{k}" for k in OVERLAPS] + [f"sub-tasks@{p}" for p in TOLERANCES]
     width = max(map(len, ["", *scores])) + 2
@@ -59,13 +59,13 @@ def scores_table(scores: dict[str, SegmentationScores]) -> str:
     return "\n".join(lines)
 
 
-def scores_json(scores: dict[str, SegmentationScores]) -> dict[str, Any]:
-    """Return the scores as JSON holds them."""
+def scores_json(scores: ScoresByPart) -> dict[str, Any]:
+    """Return the measures in a form that JSON can hold."""
     return {part: asdict(s) for part, s in scores.items()}
 
 
 def _pair(episode: Demonstration, number: int, found: Segmentation) -> LabelPair | None:
-    """Return what demonstration `number` shows and what was found; None without logged truth."""
+    """Return true and predicted labels of demonstration `number`; None without logged segments."""
     logged = episode.spans()
     if not logged:
         return None

@@ -1,4 +1,4 @@
-"""Segments of every demonstration of a source, by name of the segmenter."""
+"""The registry of segmenters, with the two that read stored segments."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -15,7 +15,7 @@ def logged(source: Source, *, jobs: int = 1) -> Segmentation:
     """Use the sub-task spans logged in the source.
 
     Raises:
-        PoolError: a demonstration has no logged sub-task, or a span leaves it.
+        PoolError: a demonstration has no logged sub-task, or a span beyond its end.
     """
     del jobs  # nothing to compute
     spans = [demo.spans() for demo in source.episodes]
@@ -23,10 +23,10 @@ def logged(source: Source, *, jobs: int = 1) -> Segmentation:
 
 
 def predictions(source: Source, *, jobs: int = 1) -> Segmentation:
-    """Use the spans that a segmenter stored in the source, with its posteriors if all are there.
+    """Use the spans that a segmenter stored in the source, with its posteriors if all exist.
 
     Raises:
-        PoolError: a demonstration has no stored span, or one that leaves it.
+        PoolError: a demonstration has no stored span, or one beyond its end.
     """
     del jobs  # nothing to compute
     spans = [demo.predicted_spans() for demo in source.episodes]
@@ -45,8 +45,8 @@ def _names(source: Source, spans: Sequence[tuple[Span, ...]]) -> tuple[str, ...]
     unknown = sorted(seen - set(names))
     if unknown:
         raise PoolError(
-            f"'{source.root}' has segments of '{unknown[0]}', "
-            f"which is none of its sub-tasks {', '.join(names)}."
+            f"'{source.root}' has segments of the unknown sub-task '{unknown[0]}'; "
+            f"its sub-tasks are {', '.join(names)}."
         )
     return names
 
@@ -54,7 +54,7 @@ def _names(source: Source, spans: Sequence[tuple[Span, ...]]) -> tuple[str, ...]
 def _checked(
     source: Source, spans: Sequence[tuple[Span, ...]], segmenter: str
 ) -> tuple[tuple[Span, ...], ...]:
-    """Return the spans of every demonstration, which must have some and hold them."""
+    """Return the spans of every demonstration after checking them."""
     return tuple(
         _checked_spans(source, demo, found, segmenter)
         for demo, found in zip(source.episodes, spans, strict=True)
@@ -82,6 +82,7 @@ SEGMENTERS: dict[str, Segmenter] = {
     "clustering": clustering,
     "predictions": predictions,
 }
+"""Every segmenter by name; others are folders."""
 
 
 def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = ()) -> Segmenter:
@@ -89,11 +90,11 @@ def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = 
 
     Args:
         name: of SEGMENTERS, or a folder.
-        subtasks: how many sub-tasks `clustering` looks for, AUTO to find that out.
-        cameras: whose pictures it compares; empty means the main one.
+        subtasks: number of sub-tasks for `clustering`; AUTO infers it.
+        cameras: cameras for `clustering`; empty means the main one.
 
     Raises:
-        ConfigError: there is none of that name, or it does not count sub-tasks.
+        ConfigError: there is no segmenter of that name, or it takes no number of sub-tasks.
         CheckpointError: the folder holds no segmenter, or a damaged one.
     """
     count = subtask_count(subtasks)
@@ -101,7 +102,7 @@ def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = 
         return partial(clustering, subtasks=count, cameras=cameras)
     if count is not None:
         raise ConfigError(
-            f"The segmenter '{name}' knows its sub-tasks; a number of them is for 'clustering'."
+            f"The segmenter '{name}' takes no number of sub-tasks; only 'clustering' does."
         )
     if name in SEGMENTERS:
         return SEGMENTERS[name]
@@ -111,6 +112,6 @@ def segmenter_named(name: str, subtasks: str = AUTO, cameras: tuple[str, ...] = 
             "that `teasim segment fit` made."
         )
     # Only here: logged labels need no torch.
-    from filtering.segmentation.mstcn_checkpoint import load_segmenter
+    from filtering.segmentation.mstcn.checkpoint import load_segmenter
 
     return load_segmenter(Path(name)).segment

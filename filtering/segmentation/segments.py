@@ -1,4 +1,4 @@
-"""What a segmenter returns, and how frame posteriors become segments."""
+"""The result of a segmenter, and the decoding of frame posteriors to segments."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,17 +24,16 @@ class Segmentation:
     spans: tuple[tuple[Span, ...], ...]
     """Per demonstration its q segments in order of time [frames]."""
     posteriors: tuple[NDArray[np.float32], ...] | None = None
-    """Per demonstration (frames, T): probability of each sub-task in each frame; what a row lacks
-    to 1 is the probability of none of them. None where segments were given, not inferred."""
+    """Per demonstration (frames, T): probability of each sub-task in each frame; 1 minus the sum of
+    a row is the probability of no sub-task. None where segments were given, not inferred."""
     labelled: frozenset[str] = frozenset()
     """demo_id of the demonstrations whose true labels the segmenter was fitted to."""
     weights_sha256: str | None = None
-    """Which segmenter inferred them; None where segments were given."""
+    """Hash of the weights of the segmenter; None where segments were given."""
 
     def labels(self) -> list[list[int]]:
         """Return per demonstration the label numbers of its segments, 0..T-1."""
-        numbers = {name: number for number, name in enumerate(self.subtasks)}
-        return [[numbers[span.subtask] for span in spans] for spans in self.spans]
+        return label_numbers(self.spans, self.subtasks)
 
     def confidence(self) -> float | None:
         """Return the mean probability of the most probable label of a frame, over all frames.
@@ -44,6 +43,17 @@ class Segmentation:
         if self.posteriors is None:
             return None
         return float(np.concatenate([video.max(axis=1) for video in self.posteriors]).mean())
+
+
+def label_numbers(spans: Sequence[tuple[Span, ...]], subtasks: tuple[str, ...]) -> list[list[int]]:
+    """Return per demonstration the label numbers of its segments, 0..T-1.
+
+    Args:
+        spans: per demonstration its q segments.
+        subtasks: names of the T labels.
+    """
+    numbers = {name: number for number, name in enumerate(subtasks)}
+    return [[numbers[span.subtask] for span in demo] for demo in spans]
 
 
 class Segmenter(Protocol):

@@ -1,9 +1,9 @@
-"""What each sub-task looks like from its beginning to its end, shared by all videos of a pool.
+"""A hidden Markov model of the sub-tasks, shared by all videos of a pool.
 
-A sub-task is a row of L stages that are gone through in order, each seen as a mean feature (a
-left-to-right hidden Markov model, as Kuehne et al., WACV 2016, use it for actions); any sub-task
-may follow any other. The first stage is common to all: sub-tasks begin alike, with the hands where
-the one before left them, so no sub-task can begin in the midst of another without cost.
+A sub-task is a sequence of L stages, each with a mean feature (a left-to-right model, as in Kuehne
+et al., WACV 2016); any sub-task may follow any other. All sub-tasks share the first stage, because
+they begin with the hands where the previous one left them; so a sub-task cannot begin within
+another one without cost.
 """
 
 from collections.abc import Sequence
@@ -14,19 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-Array = NDArray[np.float64]
+from teasim.common.arrays import Array
+
 States = NDArray[np.int64]
-"""(D, n) of each moment: sub-task * L + stage, or NOWHERE."""
+"""(D, n) sub-task * L + stage of each sampled frame, or NOWHERE."""
 
 NOWHERE = -1
-"""State of a moment after the end of a video, or of a segment that belongs to no sub-task."""
+"""State of frames after the end of a video, or of a segment of no sub-task."""
 SHRINKAGE = 0.5
-"""Moments that a stage's mean has at zero, the mean of every video, besides its own."""
+"""Pseudo-count of frames at zero, the mean of every video, in the mean of a stage."""
 
 
 @dataclass(frozen=True)
 class Videos:
-    """The videos of a pool side by side, the shorter ones filled up."""
+    """The videos of a pool, padded to equal length."""
 
     moments: Array
     """(D, n, F) features, each video's own mean taken out."""
@@ -52,7 +53,7 @@ class StageModel:
 
     @classmethod
     def from_parts(cls, video: Array, parts: Sequence[tuple[int, int]], stages: int) -> Self:
-        """Take every part `start <= moment < stop` of a video (n, F) for a sub-task."""
+        """Make every part `start <= frame < stop` of a video (n, F) a sub-task."""
         means = np.array([_stage_means(video[start:stop], stages) for start, stop in parts])
         means[:, 0] = means[:, 0].mean(axis=0)
         return cls(means)
@@ -79,7 +80,7 @@ def best_states(errors: Array, lengths: NDArray[np.int64]) -> tuple[States, floa
     """Return the states of least summed error and that sum (Viterbi).
 
     Every video begins with the first stage of a sub-task and ends with the last one of a sub-task;
-    from moment to moment a stage goes on or the next one begins.
+    from frame to frame a stage continues or the next one begins.
 
     Args:
         errors: (D, n, T, L).
@@ -111,10 +112,10 @@ def best_states(errors: Array, lengths: NDArray[np.int64]) -> tuple[States, floa
 
 
 def one_to_one(errors: Array, states: States) -> States:
-    """Give the segments of each video different sub-tasks, at the least error (Hungarian method).
+    """Assign different sub-tasks to the segments of each video at least error (Hungarian method).
 
-    While sub-tasks are learnt this keeps two of them from being taken for one that occurs twice.
-    Segments in excess of the sub-tasks go NOWHERE. `errors` (D, n, T, L) are those of `states`.
+    During learning this keeps two sub-tasks from becoming one that occurs twice. Segments beyond
+    the number of sub-tasks get the state NOWHERE. `errors` (D, n, T, L) are those of `states`.
     """
     L = errors.shape[3]
     matched = np.full_like(states, NOWHERE)
@@ -137,9 +138,9 @@ def segment_starts(path: NDArray[np.int64], stages: int) -> NDArray[np.int64]:
 
 
 def probabilities(nats: Array) -> Array:
-    """Return how probable each sub-task is at each moment of a video, (n, T), rows sum to 1.
+    """Return the probability of each sub-task at each frame of a video, (n, T), rows sum to 1.
 
-    All paths that `best_states` chooses from count (forward-backward algorithm).
+    It sums over all paths that `best_states` chooses from (forward-backward algorithm).
 
     Args:
         nats: (n, T, L) negative log-likelihood of each stage at each moment.
@@ -172,5 +173,5 @@ def _entered(before: Array, left: Array) -> Array:
 def _stage_means(part: Array, stages: int) -> Array:
     """Return the means (L, F) of equal shares of a part (n, F); shares may overlap by a moment."""
     edges = np.linspace(0, len(part), stages + 1)
-    shares = zip(np.floor(edges[:-1]).astype(int), np.ceil(edges[1:]).astype(int), strict=True)
+    shares = zip(edges[:-1].astype(int), np.ceil(edges[1:]).astype(int), strict=True)
     return np.array([part[start:stop].mean(axis=0) for start, stop in shares])

@@ -1,10 +1,10 @@
-"""One video cut into parts that look alike and follow each other: TW-FINCH.
+"""TW-FINCH: a video cut into parts of similar appearance that are close in time.
 
 Sarfraz et al., *Temporally-Weighted Hierarchical Clustering for Unsupervised Action Segmentation*,
-CVPR 2021. Every moment is joined with its nearest neighbour, where distance is difference in looks
-times distance in time; the groups are averaged and joined again, until few enough are left. The
-last joins, down to the wanted number, are made pair by pair (their algorithm 2). It knows one video
-alone: which parts of different videos show the same is found out in `discovery`.
+CVPR 2021. Every frame is joined with its nearest neighbour, where the distance is the difference in
+appearance times the distance in time; the groups are averaged and joined again until few enough are
+left. The last joins, down to the number asked for, are made pair by pair (their algorithm 2). It
+uses a single video; `discovery` relates the parts of different videos.
 """
 
 import numpy as np
@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-Array = NDArray[np.float64]
+from teasim.common.arrays import Array
+
 Labels = NDArray[np.int64]
 
 
 def partition(moments: Array, parts: int) -> Labels:
-    """Return the part that each moment of a video belongs to, (n,), 0..parts-1.
+    """Return the part (n,) of each frame of a video, 0..parts-1.
 
-    A part may return after another one. Fewer than `parts` moments are a part each.
+    A part may occur again after another one. Fewer than `parts` frames are a part each.
 
     Args:
         moments: (n, F) features.
-        parts: number of parts wanted, 1 or more.
+        parts: number of parts, 1 or more.
     """
     labels = np.arange(len(moments))
     while True:

@@ -1,4 +1,4 @@
-"""Background subtraction: what stands still becomes grey (paper section 3.2).
+"""Background subtraction: static pixels become grey (paper section 3.2).
 
 Foreground masks are cleaned by an opening with a 3x3 ellipse. The grey is the backbone's zero.
 """
@@ -17,7 +17,7 @@ DIFFERENCE = 20
 MOG2_VARIANCE = 16.0
 """Squared Mahalanobis distance that makes a pixel foreground for MOG2 (OpenCV's default)."""
 MOG2_RATIO = 0.6
-"""Share of the overview that a pixel's background states make up; what is rarer moves."""
+"""Share of the overview frames that the background states of a pixel make up."""
 
 Subtraction = Callable[[Frames, Frames], Frames]
 """Takes frames in order of time and frames spread over the whole video; returns the foreground."""

@@ -1,4 +1,4 @@
-"""Every video of a pool as a row of features per moment, at a rate of its own, cached."""
+"""Cached features of the videos of a pool, one row per sampled frame."""
 
 import hashlib
 import json
@@ -24,13 +24,13 @@ CHUNK = 64
 
 @dataclass(frozen=True)
 class FrameSource:
-    """What is looked at in a video."""
+    """Cameras and sampling rate from which features are computed."""
 
     cameras: tuple[str, ...]
-    """Cameras whose features are put side by side."""
+    """Cameras whose features are concatenated."""
     rate: float = 2.5
-    """Moments looked at per second [Hz]: every fourth frame of a video at 10 frames/s. Twice as
-    many take twice the time and make segments of tea-making no better."""
+    """Frames used per second [Hz]; 2.5 is every fourth frame at 10 frames/s. Twice as many did not
+    improve the segments of tea pools."""
 
     def __post_init__(self) -> None:
         """Refuse a source without pictures.
@@ -50,18 +50,18 @@ class FrameSource:
 
 @dataclass(frozen=True)
 class FrameTask:
-    """One video to describe; small, so that it travels to a worker process."""
+    """One video to describe; small, because it is sent to a worker process."""
 
     clip: Clip
     """Where the frames are."""
     count: int
-    """Moments to look at."""
+    """Number of frames to use."""
     cache_folder: Path
     """Folder of the feature cache."""
 
 
 class Cached(Protocol):
-    """Something that is done once and kept."""
+    """Work whose result is cached."""
 
     @property
     def cache_folder(self) -> Path:
@@ -72,17 +72,17 @@ Task = TypeVar("Task", bound=Cached)
 
 
 def sample_count(length: int, fps: float, rate: float) -> int:
-    """Return at how many moments a video of `length` frames is looked at, 1..length."""
+    """Return the number of frames used of a video of `length` frames, 1..length."""
     return min(length, max(1, round(length * rate / fps)))
 
 
 def sampled_frames(length: int, count: int) -> NDArray[np.int64]:
-    """Return the frame of each moment, (count,): the middles of equal parts of the video."""
+    """Return the numbers (count,) of the sampled frames: middles of equal parts of the video."""
     return uniform_indices(0, length, count)
 
 
 def moment_of_frames(length: int, count: int) -> NDArray[np.int64]:
-    """Return for each frame the moment that is nearest, (length,); of two the later."""
+    """Return for each frame the nearest sample (length,); of two the later."""
     moments = sampled_frames(length, count)
     edges = (moments[:-1] + moments[1:] + 1) // 2
     return np.searchsorted(edges, np.arange(length), side="right")

@@ -1,1 +1,1 @@
-"""What learners are given: samples read from pools, and a weight per demonstration."""
+"""Input of the learners: samples read from pools, and a weight per demonstration."""

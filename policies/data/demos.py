@@ -1,8 +1,8 @@
-"""A pool -> the decisions in it: what was seen before each sub-task, and which one came next.
+"""Read the decisions of a pool: the observation before each sub-task, and the sub-task chosen.
 
-The robot rests in its start pose whenever it decides, so the frame at the start of a sub-task's
-span is what a policy will see. The rest frames beside it show nothing new, altered copies do
-(augmentation.py).
+The robot rests in its start pose at every decision, so a policy will see what the frame at the
+start of a sub-task's span shows. The neighbouring frames add nothing; altered copies do
+(features.py).
 """
 
 import zlib
@@ -12,19 +12,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.data.augmentation import views
-from policies.data.features import NO_MAPS, Maps, camera_maps
+from policies.data.features import NO_MAPS, Maps, camera_maps, views
 from policies.data.samples import DecisionSamples, ObservationSpec
 from teasim.common import parallel
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Episode, Pool
-
-STATE_COLUMN = "observation.state"
-ENVIRONMENT_COLUMN = "observation.environment_state"
+from teasim.pool.lerobot.layout import ENVIRONMENT_STATE, STATE
 
 OBSERVE = ("auto", "pixels", "pixels_agent_pos", "state")
-"""`auto`: joint positions too where the pool logs them, frames alone (human videos) where not.
-`state`: joint positions and environment state, no frames; trains and plays without a camera."""
+"""`auto`: frames, and joint positions if the pool logs them (videos of people have none). `state`:
+joint positions and environment state, no frames; needs no rendering."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +29,13 @@ class DemosConfig:
     """How a pool is turned into decisions."""
 
     observe: str = "auto"
-    """What a policy will see: `auto`, `pixels`, `pixels_agent_pos` or `state`."""
+    """What the policy sees: `auto`, `pixels`, `pixels_agent_pos` or `state`."""
     cameras: tuple[str, ...] = ()
-    """Cameras to use; empty: all of the pool."""
+    """Cameras the policy sees; empty: all of the pool."""
     copies: int = 3
-    """Altered copies of each decision's frames."""
+    """Number of altered copies of each decision's frames."""
     seed: int = 0
-    """Seed of the alterations; they depend on nothing else but the demonstration."""
+    """Seed of the alterations, which otherwise depend on the demonstration alone."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for an unknown way to observe or a negative number of copies."""
@@ -51,7 +48,7 @@ class DemosConfig:
 def load_decisions(
     pool: Pool, config: DemosConfig | None = None, *, jobs: int = 1
 ) -> DecisionSamples:
-    """Read the decisions of every demonstration of `pool`, in its order.
+    """Read the decisions of every demonstration of `pool`, in the order of the pool.
 
     Raises:
         ConfigError: a camera or the joint log that `config` asks for is not in the pool.
@@ -73,7 +70,7 @@ def load_decisions(
 
 
 def observation_spec(pool: Pool, config: DemosConfig) -> ObservationSpec:
-    """Say what a policy trained on `pool` looks at.
+    """Describe what a policy trained on `pool` sees.
 
     Raises:
         ConfigError: a camera or the joint log that `config` asks for is not in the pool.
@@ -102,8 +99,8 @@ def _read_demo(
     spans = episode.spans()
     starts = [span.start for span in spans]
     labels = np.array([subtasks.index(span.subtask) for span in spans], dtype=np.int64)
-    columns = [STATE_COLUMN] if spec.state_names else []
-    columns += [ENVIRONMENT_COLUMN] if spec.environment_names else []
+    columns = [STATE] if spec.state_names else []
+    columns += [ENVIRONMENT_STATE] if spec.environment_names else []
     nothing = np.empty((len(spans), 0))
     parts = [nothing, *(episode.column(name)[starts] for name in columns)]
     return _maps(episode, starts, spec, config), np.hstack(parts).astype(np.float32), labels
@@ -124,13 +121,22 @@ def _maps(episode: Episode, starts: list[int], spec: ObservationSpec, config: De
 
 
 def _environment_names(pool: Pool) -> tuple[str, ...]:
-    feature = pool.info["features"].get(ENVIRONMENT_COLUMN)
-    if feature is None:
+    names = column_names(pool, ENVIRONMENT_STATE)
+    if not names:
         raise ConfigError(
             f"'{pool.root}' logs no environment state; choose observe auto, pixels or "
             "pixels_agent_pos instead."
         )
-    (length,) = feature["shape"]
+    return names
+
+
+def column_names(pool: Pool, column: str) -> tuple[str, ...]:
+    """Return the names of the numbers in a column of `pool`, () if it is not logged.
+
+    Pools of other programs may give no names; then the numbers are called 0, 1, ...
+    """
+    feature = pool.info["features"].get(column)
+    if feature is None:
+        return ()
     names = feature.get("names")
-    # Foreign pools may name nothing; what counts is how many numbers there are.
-    return tuple(map(str, names if isinstance(names, list) else range(length)))
+    return tuple(map(str, names if isinstance(names, list) else range(feature["shape"][0])))

@@ -1,8 +1,12 @@
-"""What a policy computes from frames: the feature maps of the pretrained network.
+"""Feature maps of frames, and altered copies of frames to learn from.
 
-A decision hangs on small things (milk in the cup, sugar in the pot, a glowing plate), so the maps
-are kept at stride 16 and not pooled here. The network is frozen and is the filter's own; this is
-the one module of the learners that imports from `filtering`, and it takes nothing else from there.
+A decision depends on small details (milk in the cup, sugar in the pot, a glowing plate), so the
+maps keep stride 16 and are not pooled here. The network is pretrained, frozen and the same as the
+filter's.
+
+Ten demonstrations show ten placements of every cup and jug; shifted copies stand in for those in
+between. Frames of a pool were smoothed by video compression, those of a camera were not, so copies
+also get noise.
 """
 
 from collections.abc import Mapping
@@ -18,11 +22,26 @@ Maps = NDArray[np.float16]
 """Feature maps (..., K, C, h, w) of K cameras; half precision, because a pool has many."""
 
 NO_MAPS = (0, 0, 1, 1)
-"""Shape (K, C, h, w) of the maps of no camera."""
+"""Shape (K, C, h, w) of the maps without cameras."""
+
+SHIFT = 0.07
+"""Largest shift to each side, relative to the height of the frame."""
+LIGHT = 0.15
+"""Largest relative change of brightness."""
+NOISE = 4.0
+"""Largest standard deviation of added pixel noise [grey levels]."""
+
+
+def views(frames: NDArray[np.uint8], copies: int, random: np.random.Generator) -> NDArray[np.uint8]:
+    """Return frames (n, H, W, 3) and `copies` altered ones of each, (n, 1 + copies, H, W, 3)."""
+    altered = [[_alter(frame, random) for _ in range(copies)] for frame in frames]
+    return np.stack(
+        [np.stack([frame, *others]) for frame, others in zip(frames, altered, strict=True)]
+    )
 
 
 def camera_maps(pixels: Mapping[str, NDArray[np.uint8]], cameras: tuple[str, ...]) -> Maps:
-    """Compute the maps of `cameras`, in that order.
+    """Compute the feature maps of `cameras`, in that order.
 
     Args:
         pixels: camera -> frames (n, H, W, 3) RGB.
@@ -33,6 +52,18 @@ def camera_maps(pixels: Mapping[str, NDArray[np.uint8]], cameras: tuple[str, ...
     """
     with one_thread(), torch.inference_mode():
         return np.stack([_maps(pixels[camera]) for camera in cameras], axis=1)
+
+
+def _alter(frame: NDArray[np.uint8], random: np.random.Generator) -> NDArray[np.uint8]:
+    """Shift a frame, mirroring its edge into the gap, scale its brightness and add noise."""
+    height, width, _ = frame.shape
+    reach = round(SHIFT * height)
+    padded = np.pad(frame, ((reach, reach), (reach, reach), (0, 0)), mode="reflect")
+    top, left = random.integers(0, 2 * reach, size=2, endpoint=True)
+    light = random.uniform(1 - LIGHT, 1 + LIGHT)
+    moved = padded[top : top + height, left : left + width].astype(np.float32)
+    noise = random.normal(0, random.uniform(0, NOISE), frame.shape)
+    return (moved * light + noise).round().clip(0, 255).astype(np.uint8)
 
 
 def _maps(frames: NDArray[np.uint8]) -> Maps:

@@ -1,4 +1,4 @@
-"""A pool -> the motion in it: what was seen at every control step, and where the joints were sent.
+"""Read the motion of a pool: the state at every control step, and the joint targets.
 
 The joint level sees the state alone: joint positions, then the environment state.
 """
@@ -9,22 +9,20 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from policies.data.demos import column_names
 from policies.data.samples import Observation, ObservationSpec
 from teasim.common import parallel
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Episode, Pool
-
-STATE_COLUMN = "observation.state"
-ENVIRONMENT_COLUMN = "observation.environment_state"
-ACTION_COLUMN = "action"
+from teasim.pool.lerobot.layout import ACTION, ENVIRONMENT_STATE, STATE
 
 OBSERVE = ("auto", "state")
-"""Ways to observe that the joint level has; `auto` is `state` here."""
+"""Values of `observe` at the joint level; `auto` means `state` here."""
 
 
 @dataclass(frozen=True)
 class MotionSamples:
-    """The control steps of a pool, n in all; those of one demonstration in the order of time."""
+    """The n control steps of a pool; those of one demonstration are in temporal order."""
 
     low_dim: NDArray[np.float32]
     """Joint positions [rad; m for grippers], then environment state.  # (n, S)"""
@@ -33,9 +31,9 @@ class MotionSamples:
     demos: NDArray[np.int64]
     """Position in the pool of the demonstration the step comes from.  # (n,)"""
     spec: ObservationSpec
-    """What was looked at."""
+    """What is seen."""
     action_names: tuple[str, ...]
-    """Names of the targets, J."""
+    """Names of the J targets."""
 
     def __post_init__(self) -> None:
         """Check that the fields belong together and make the arrays read-only."""
@@ -59,7 +57,7 @@ class MotionSamples:
 
 
 def load_motions(pool: Pool, observe: str = "auto", *, jobs: int = 1) -> MotionSamples:
-    """Read every control step of every demonstration of `pool`, in its order.
+    """Read every control step of every demonstration of `pool`, in the order of the pool.
 
     Raises:
         ConfigError: `observe` is not of this level, or the pool has no joint log to learn from.
@@ -69,7 +67,9 @@ def load_motions(pool: Pool, observe: str = "auto", *, jobs: int = 1) -> MotionS
         raise ConfigError(
             f"The level 'joint' sees no pictures; choose observe {' or '.join(OBSERVE)}."
         )
-    spec, action_names = _logged_names(pool)
+    check_log(pool)
+    names = tuple(pool.state_names or ()), column_names(pool, ENVIRONMENT_STATE)
+    spec, action_names = ObservationSpec((), 0, 0, *names), column_names(pool, ACTION)
     read = partial(_read_demo, spec=spec)
     demos = parallel.run(read, pool.episodes, jobs=jobs, description="motions")
     low_dim, targets = (np.concatenate(parts) for parts in zip(*demos, strict=True))
@@ -81,7 +81,7 @@ def load_motions(pool: Pool, observe: str = "auto", *, jobs: int = 1) -> MotionS
 
 
 def seen_numbers(observation: Observation, spec: ObservationSpec) -> NDArray[np.float32]:
-    """What a policy of `spec` sees of an observation, (S,), or of a batch of n, (n, S)."""
+    """Return the state that a policy of `spec` sees, (S,), or (n, S) for a batch of n."""
     parts = [np.asarray(observation["agent_pos"])]
     if spec.environment_names:
         environment = np.asarray(observation["environment_state"])
@@ -90,9 +90,9 @@ def seen_numbers(observation: Observation, spec: ObservationSpec) -> NDArray[np.
 
 
 def one_sign(environment: NDArray[np.floating], names: tuple[str, ...]) -> NDArray[np.floating]:
-    """Return the environment state (..., E) with every quaternion turned to qw >= 0.
+    """Return the environment state (..., E) with every quaternion at qw >= 0.
 
-    A quaternion and its negative are one rotation, which must not look like two.
+    A quaternion and its negative are the same rotation and must have the same numbers.
     """
     turned = environment.copy()
     for place, name in enumerate(names):
@@ -102,38 +102,26 @@ def one_sign(environment: NDArray[np.floating], names: tuple[str, ...]) -> NDArr
     return turned
 
 
-def _logged_names(pool: Pool) -> tuple[ObservationSpec, tuple[str, ...]]:
-    """Say what is seen and what is controlled, from the columns the pool declares."""
-    if not pool.state_names or ACTION_COLUMN not in pool.info["features"]:
+def check_log(pool: Pool) -> None:
+    """Raise ConfigError unless `pool` logs joint positions and one joint target for each."""
+    targets = column_names(pool, ACTION)
+    if not pool.state_names or not targets:
         raise ConfigError(
             f"'{pool.root}' has no joint log, so there is no motion to learn from it; "
             "choose level subtask instead."
         )
-    targets = _names(pool, ACTION_COLUMN)
     if len(targets) != len(pool.state_names):
         raise ConfigError(
             f"'{pool.root}' logs {len(targets)} targets for {len(pool.state_names)} joints; "
             "the level 'joint' needs one for each."
         )
-    return ObservationSpec((), 0, 0, tuple(pool.state_names), _names(pool, ENVIRONMENT_COLUMN)), (
-        targets
-    )
-
-
-def _names(pool: Pool, column: str) -> tuple[str, ...]:
-    """Names of the numbers in a column, () if it is not logged; foreign pools may name nothing."""
-    feature = pool.info["features"].get(column)
-    if feature is None:
-        return ()
-    names = feature.get("names")
-    return tuple(map(str, names if isinstance(names, list) else range(feature["shape"][0])))
 
 
 def _read_demo(
     episode: Episode, *, spec: ObservationSpec
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Read one demonstration: what was seen (n, S), targets (n, J)."""
-    observation = {"agent_pos": episode.column(STATE_COLUMN)}
+    """Read one demonstration: states (n, S), targets (n, J)."""
+    observation = {"agent_pos": episode.column(STATE)}
     if spec.environment_names:
-        observation["environment_state"] = episode.column(ENVIRONMENT_COLUMN)
-    return seen_numbers(observation, spec), episode.column(ACTION_COLUMN).astype(np.float32)
+        observation["environment_state"] = episode.column(ENVIRONMENT_STATE)
+    return seen_numbers(observation, spec), episode.column(ACTION).astype(np.float32)

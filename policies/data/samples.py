@@ -1,4 +1,4 @@
-"""What a learner is given, and how a policy is asked for a decision."""
+"""What a learner is given, and how a policy is called."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ STATE_KEYS = ("agent_pos", "environment_state")
 """Parts of the observation that are the state, in the order in which a policy sees them."""
 
 RecurrentState = tuple[NDArray[np.floating[Any]], ...]
-"""What a policy with a memory carries from one decision to the next."""
+"""What a recurrent policy carries from one decision to the next."""
 
 
 @dataclass(frozen=True)
 class ObservationSpec:
-    """What a policy looks at; an environment must offer exactly this."""
+    """What a policy sees; an environment must provide exactly this."""
 
     cameras: tuple[str, ...]
     """Cameras in the order of their features; empty: the policy sees the state alone."""
@@ -35,28 +35,28 @@ class ObservationSpec:
 
     @property
     def low_dim(self) -> int:
-        """S, how many numbers are seen beside the pictures."""
+        """S, how many numbers are seen besides the pictures."""
         return len(self.state_names) + len(self.environment_names)
 
 
 @dataclass(frozen=True)
 class DecisionSamples:
-    """The decisions of a pool: what was seen before each sub-task, and which one was chosen.
+    """The decisions of a pool: the observation before each sub-task, and the sub-task chosen.
 
-    n decisions, each in V views (the frames as they were, then altered copies), K cameras. Those of
-    one demonstration stand in the order of time.
+    There are n decisions, each in V views (the original frames, then altered copies) of K cameras.
+    Those of one demonstration are in temporal order.
     """
 
     maps: NDArray[np.float16]
-    """Feature maps of what was seen.  # (n, V, K, C, h, w)"""
+    """Feature maps of the frames.  # (n, V, K, C, h, w)"""
     low_dim: NDArray[np.float32]
-    """Joint positions, then environment state; S = 0 where frames alone are seen.  # (n, S)"""
+    """Joint positions, then environment state; S = 0 if only frames are seen.  # (n, S)"""
     labels: NDArray[np.int64]
     """Chosen sub-task, an index into `action_names`.  # (n,)"""
     demos: NDArray[np.int64]
     """Position in the pool of the demonstration the decision comes from.  # (n,)"""
     spec: ObservationSpec
-    """What was looked at."""
+    """What is seen."""
     action_names: tuple[str, ...]
     """Sub-tasks a policy chooses from, in the order of the actions."""
 
@@ -96,8 +96,8 @@ class DecisionSamples:
 def pictures(observation: Observation, cameras: tuple[str, ...]) -> dict[str, NDArray[np.uint8]]:
     """Return the frame or batch of frames of each of `cameras`.
 
-    With one camera `pixels` is that camera's picture, with several a picture per name; for
-    stable-baselines3 (sb3.py) the pictures of several cameras have keys of their own.
+    `pixels` is a picture for one camera, and a mapping of pictures for several. In observations
+    for stable-baselines3 (sb3.py) the pictures of several cameras have separate keys.
     """
     if "pixels" not in observation:
         return {camera: np.asarray(observation[f"pixels_{camera}"]) for camera in cameras}
@@ -111,7 +111,9 @@ class Policy(Protocol):
     """A decision rule with the calling convention of stable-baselines3."""
 
     spec: ObservationSpec
+    """What it sees."""
     action_names: tuple[str, ...]
+    """Names of its actions."""
 
     def set_random_seed(self, seed: int) -> None:
         """Restart the random numbers of sampled decisions."""
@@ -125,15 +127,15 @@ class Policy(Protocol):
     ) -> tuple[NDArray[np.int64], RecurrentState | None]:
         """Choose an action, () int64 for one observation and (n,) for a batch of n.
 
-        `state` is None for a policy without memory; `episode_start` (n,) tells where it restarts.
+        `state` is None for a policy that is not recurrent; `episode_start` (n,) marks new episodes.
         """
 
 
 class TrainedPolicy:
-    """What every learned policy is made of; subclasses say how it decides."""
+    """Common part of the learned policies; subclasses implement `predict`."""
 
     def __init__(self, network: Any, spec: ObservationSpec, action_names: tuple[str, ...]) -> None:
-        """Take over a trained network; random numbers start at seed 0."""
+        """Hold a trained network; random numbers start at seed 0."""
         network.eval()
         self.network = network
         self.spec = spec

@@ -1,6 +1,6 @@
-"""The one place where the weight of a demonstration meets a loss.
+"""Weights of demonstrations: read from a table, and applied to the rows a learner is given.
 
-The law every learner keeps: weight 0 equals the demonstration removed, weight 2 equals it twice.
+Every learner obeys: weight 0 equals the demonstration removed, weight 2 equals it twice.
 """
 
 from pathlib import Path
@@ -10,20 +10,19 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from policies.data.moments import Moments
-from policies.data.samples import DecisionSamples
 from teasim.common.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow, match_rows, read_weight_table
 
 USES = ("discard", "weight", "ignore")
-"""`discard` drops flagged demonstrations, `weight` takes each at its weight, `ignore` takes all."""
+"""How a weight table is used: `discard` leaves out flagged demonstrations, `weight` takes each at
+its weight, `ignore` takes all."""
 
 
 def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64]:
     """Weight of every demonstration of `pool`, (D,); ones without a table.
 
-    Rows are matched by `demo_id`, so a pool whose episodes were re-numbered still fits its table.
+    Rows are matched by `demo_id`, so a table still fits a pool whose episodes were renumbered.
 
     Raises:
         ConfigError: `use` is unknown or needs a table, the table belongs to another pool, or it
@@ -47,9 +46,9 @@ def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64
 
 
 def likely_experts(pool: Pool, table: Path) -> tuple[int, ...]:
-    """Places in `pool` of the quarter of its demonstrations, at least one, with the largest weight.
+    """Places in `pool` of the quarter of its demonstrations (at least one) of largest weight.
 
-    Of equal weights the one with the smaller loss goes first; flagged demonstrations go last.
+    Ties are broken by the smaller loss; flagged demonstrations come last.
 
     Raises:
         ConfigError: the table belongs to another pool.
@@ -88,7 +87,7 @@ def _weight(row: WeightRow, use: str) -> float:
 
 
 class Samples(Protocol):
-    """What a learner is given: rows, each from a demonstration."""
+    """Rows that a learner is given, each from a demonstration."""
 
     @property
     def demos(self) -> NDArray[np.int64]:
@@ -98,11 +97,13 @@ class Samples(Protocol):
         """Return the rows where `rows` (n,) is true."""
 
 
-Rows = TypeVar("Rows", bound=Samples)
+AnySamples = TypeVar("AnySamples", bound=Samples)
 
 
-def weigh(samples: Rows, weights: NDArray[np.float64]) -> tuple[Rows, NDArray[np.float64]]:
-    """Return the rows that count and the share of the total each one has, (n,), sum 1.
+def weigh(
+    samples: AnySamples, weights: NDArray[np.float64]
+) -> tuple[AnySamples, NDArray[np.float64]]:
+    """Return the rows of positive weight, and each row's share of the total weight, (n,), sum 1.
 
     Args:
         samples: decisions or control steps of a pool of D demonstrations.
@@ -127,16 +128,3 @@ def weigh(samples: Rows, weights: NDArray[np.float64]) -> tuple[Rows, NDArray[np
 def weighted_loss(losses: torch.Tensor, shares: torch.Tensor) -> torch.Tensor:
     """Mean of `losses` (n,) under `shares` (n,) that sum to 1, as `weigh` returns them."""
     return (losses * shares).sum()
-
-
-def weighted_moments(samples: DecisionSamples, shares: NDArray[np.float64]) -> Moments:
-    """Mean and standard deviation of the inputs of `samples` under `shares` (n,) that sum to 1."""
-    rest = (0, 3, 4)  # views and places in the picture
-    means = np.stack([maps.mean(axis=rest, dtype=np.float64) for maps in samples.maps])
-    squares = np.stack([np.square(maps, dtype=np.float64).mean(axis=rest) for maps in samples.maps])
-    map_mean = np.tensordot(shares, means, axes=1)
-    map_variance = np.tensordot(shares, squares, axes=1) - map_mean**2
-    numbers = samples.low_dim.astype(np.float64)
-    mean = shares @ numbers
-    deviation = np.sqrt(shares @ (numbers - mean) ** 2)
-    return Moments(map_mean, np.sqrt(np.maximum(map_variance, 0.0)), mean, deviation)

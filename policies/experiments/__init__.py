@@ -1,1 +1,1 @@
-"""Filter, then train: the only room that sees the filter."""
+"""Experiments that run the filter before training; no other part of policies imports it."""

@@ -1,12 +1,12 @@
-"""The main job, small, start to end: pool -> filter -> two policies -> scores -> report.
+"""The whole method on a small pool: pool -> filter -> two policies -> scores -> report.
 
-The question (the paper, section 4.3): is a policy better when the demonstrations that the filter
-flags are left out? The labels of the pool are read for scoring the filter only.
+The question (the paper, section 4.3): is a policy better without the demonstrations that the filter
+flags? The labels of the pool are read only to score the filter.
 """
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import entry_points, version
 from pathlib import Path
@@ -27,10 +27,10 @@ from policies.data.weighting import demo_weights
 from policies.experiments.score_section import score_section, sentences
 from policies.learners.bc_rnn import BCRNN, BCRNNConfig
 from policies.learners.subtask_policy import SubtaskPolicy
-from policies.play.evaluation import EvaluationConfig, Scores, evaluate_all
+from policies.play.evaluation import Scores, evaluate_all
 from policies.play.results import as_json
 from policies.play.results import summary as rates
-from policies.play.rollout import EnvironmentConfig
+from policies.settings import DemoSettings, EvaluationConfig, job_count
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder, write_json
@@ -42,49 +42,15 @@ KEPT = "without the flagged"
 
 
 @dataclass(frozen=True)
-class DemoConfig:
-    """Size and seed of the demo; the defaults take about three minutes on two cores."""
-
-    seq1: int = 10
-    """Correct demonstrations (Seq_1)."""
-    seq3: int = 4
-    """Incorrect demonstrations (Seq_3)."""
-    episodes: int = 12
-    """Evaluation episodes per policy and mode."""
-    seed: int = 0
-    """Seed of the pool, the filter and the learner."""
-    frames_per_segment: int = 16
-    """Frames the filter looks at in each segment; fewer than its default, for speed."""
-    environment: EnvironmentConfig = field(
-        default_factory=partial(EnvironmentConfig, max_actions=10)
-    )
-    """The world the policies are tried out in; 7 actions make tea, and who needs 3 more is lost."""
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a pool that cannot be filtered, or no episode."""
-        if min(self.seq1, self.seq3) < 0 or self.seq1 + self.seq3 < FEWEST_DEMOS:
-            raise ConfigError(
-                f"The demo needs {FEWEST_DEMOS} demonstrations or more, "
-                f"not --seq1 {self.seq1} --seq3 {self.seq3}."
-            )
-        if self.seq3 >= self.seq1:
-            raise ConfigError(
-                f"--seq3 {self.seq3} is not fewer than --seq1 {self.seq1}, but the filter takes "
-                "what most demonstrations do for correct; ask for fewer incorrect ones."
-            )
-        EvaluationConfig(self.episodes)
-
-
-@dataclass(frozen=True)
-class Findings:
-    """What the demo found out."""
+class DemoResult:
+    """Result of the demo."""
 
     flagged: tuple[int, ...]
     """Episodes the filter flagged."""
     incorrect: tuple[int, ...]
     """Episodes that are incorrect by their labels."""
     scores: Mapping[str, Mapping[str, Scores]]
-    """Training set -> mode -> scores; one training set if the filter leaves none or all."""
+    """Training set -> mode -> scores; one training set if the filter flags none or all."""
     seconds: Mapping[str, float]
     """Wall time of each stage [s]."""
 
@@ -104,72 +70,97 @@ class Stopwatch:
         self._began = now
 
 
-def run_demo(out: Path, config: DemoConfig, *, jobs: int) -> str:
-    """Do everything in the new folder `out` and return the summary to print.
+def run_demo(settings: DemoSettings) -> str:
+    """Run everything in the new folder `settings.out` and return the summary to print.
 
     Raises:
-        ConfigError: `out` is in use.
+        ConfigError: the folder is in use, or the pool would be too small to filter.
         TeasimError: the pool could not be generated.
     """
-    check_new_folder(out)
-    watch = Stopwatch()
-    pool = generate_pool(out / "pool", config, jobs)
+    trial = EvaluationConfig(settings.episodes, environment=settings.environment)
+    check_size(settings)
+    check_new_folder(settings.out)
+    out, jobs, watch = settings.out, job_count(settings.jobs), Stopwatch()
+    pool = generate_pool(out / "pool", settings, jobs)
     watch.lap("generate")
-    fitted = DemoFilter(FilterConfig(frames_per_segment=config.frames_per_segment))
+    fitted = DemoFilter(FilterConfig(frames_per_segment=settings.frames_per_segment))
     fitted.fit(pool, jobs=jobs)
     write_filter_output(out / "filter", pool, fitted)
     watch.lap("filter")
-    policies = train_policies(pool, out / "filter" / "weights.csv", out / "policies", config, jobs)
+    sets = training_sets(pool, out / "filter" / "weights.csv")
+    policies = train_policies(pool, sets, settings, jobs)
     watch.lap("train")
-    trial = EvaluationConfig(episodes=config.episodes, environment=config.environment)
     found = evaluate_all(list(policies.values()), trial, jobs=jobs)
     scores = dict(zip(policies, found, strict=True))
     watch.lap("evaluate")
-    findings = Findings(
+    result = DemoResult(
         tuple(row.episode_index for row in fitted.table() if row.flagged),
         tuple(e.index for e in pool.episodes if e.record is not None and not e.record.correct),
         scores,
         watch.seconds,
     )
-    write_report(out / "report.html", pool, fitted, findings)
-    write_json(out / "demo.json", as_record(findings, config))
-    return summary(findings, out)
+    write_report(out / "report.html", pool, fitted, result)
+    write_json(out / "demo.json", as_record(result, settings))
+    return summary(result, out)
 
 
-def generate_pool(path: Path, config: DemoConfig, jobs: int) -> Pool:
-    """Generate the pool by the verb of the command line: policies never import the world.
+def check_size(settings: DemoSettings) -> None:
+    """Raise ConfigError for numbers of demonstrations that cannot be filtered."""
+    seq1, seq3 = settings.seq1, settings.seq3
+    if min(seq1, seq3) < 0 or seq1 + seq3 < FEWEST_DEMOS:
+        raise ConfigError(
+            f"The demo needs {FEWEST_DEMOS} demonstrations or more, "
+            f"not --seq1 {seq1} --seq3 {seq3}."
+        )
+    if seq3 >= seq1:
+        raise ConfigError(
+            f"--seq3 {seq3} is not fewer than --seq1 {seq1}, but the filter takes "
+            "what most demonstrations do for correct; ask for fewer incorrect ones."
+        )
+
+
+def generate_pool(path: Path, settings: DemoSettings, jobs: int) -> Pool:
+    """Generate the pool with the verb `generate`: policies never import the simulator.
 
     Raises:
-        TeasimError: what the verb says, in its own sentence.
+        TeasimError: the verb failed, in its own sentence.
     """
     (verb,) = entry_points(group="teasim.verbs", name="generate")
-    numbers = {"seq1": config.seq1, "seq3": config.seq3, "seed": config.seed, "jobs": jobs}
+    numbers = {"seq1": settings.seq1, "seq3": settings.seq3, "seed": settings.seed, "jobs": jobs}
     options = [word for name, number in numbers.items() for word in (f"--{name}", str(number))]
     verb.load()([str(path), *options])
     return Pool.open(path)
 
 
-def train_policies(
-    pool: Pool, table: Path, out: Path, config: DemoConfig, jobs: int
-) -> dict[str, SubtaskPolicy]:
-    """Clone behaviour from all of `pool`, and again without what the weight `table` flags.
+def training_sets(pool: Pool, table: Path) -> dict[str, NDArray[np.float64]]:
+    """Weights (D,) of all of `pool`, and of what is left without the flagged demonstrations.
 
-    From the state, with a memory: what differs between the two is then what they were shown, not
-    what can be made out in a picture. The second is left out where the filter flags nothing, or
-    everything.
+    The second is missing if the filter flags none, or all.
     """
     sets = {ALL: demo_weights(pool, table, "ignore")}
     if len({row.flagged for row in read_weight_table(table)}) == 2:
         sets[KEPT] = demo_weights(pool, table, "discard")
+    return sets
+
+
+def train_policies(
+    pool: Pool, sets: Mapping[str, NDArray[np.float64]], settings: DemoSettings, jobs: int
+) -> dict[str, SubtaskPolicy]:
+    """Clone behaviour from each of the training `sets` and save the policies.
+
+    The policies are recurrent and see the state, so they differ by the demonstrations they learn
+    from and not by what is visible in a picture.
+    """
     samples = load_decisions(pool, DemosConfig(observe="state"), jobs=jobs)
-    settings = BCRNNConfig(seed=config.seed)
-    fit = partial(_fit, samples, settings)
+    config = BCRNNConfig(seed=settings.seed)
+    fit = partial(_fit, samples, config)
     learned = parallel.run(fit, list(sets.values()), jobs=jobs, description="policies")
     policies = dict(zip(sets, learned, strict=True))
     for name, policy in policies.items():
         weights = sets[name].tolist()
-        training = {"learner": "bc-rnn", "settings": asdict(settings), "weights": weights}
-        save_policy(policy, out / name.replace(" ", "_"), training=training)
+        training = {"learner": "bc-rnn", "settings": asdict(config), "weights": weights}
+        run = settings.out / "policies" / name.replace(" ", "_")
+        save_policy(policy, run, training=training)
     return policies
 
 
@@ -179,39 +170,40 @@ def _fit(
     return BCRNN(config).fit(samples, weights).policy_
 
 
-def write_report(path: Path, pool: Pool, fitted: DemoFilter, findings: Findings) -> None:
-    """Write the filter's page with the policies' scores at its end."""
+def write_report(path: Path, pool: Pool, fitted: DemoFilter, result: DemoResult) -> None:
+    """Write the filter's report with a section on the scores of the policies."""
     render_report(
         path,
         demos=demo_views(pool, fitted),
         threshold=fitted.threshold_,
         subtasks=fitted.segments_.subtasks,
-        sections=[ReportSection("What that does to a policy", score_section(findings.scores))],
+        sections=[ReportSection("What that does to a policy", score_section(result.scores))],
     )
 
 
-def as_record(findings: Findings, config: DemoConfig) -> dict[str, Any]:
-    """Everything that was found, as JSON can hold it."""
+def as_record(result: DemoResult, settings: DemoSettings) -> dict[str, Any]:
+    """Return the settings and the result as JSON can hold them."""
+    config = {k: v for k, v in asdict(settings).items() if k not in ("out", "jobs")}
     return {
         "version": version("teasim"),
-        "config": asdict(config),
-        "flagged": findings.flagged,
-        "incorrect": findings.incorrect,
-        "scores": {name: as_json(by_mode) for name, by_mode in findings.scores.items()},
-        "seconds": findings.seconds,
+        "config": config,
+        "flagged": result.flagged,
+        "incorrect": result.incorrect,
+        "scores": {name: as_json(by_mode) for name, by_mode in result.scores.items()},
+        "seconds": result.seconds,
     }
 
 
-def summary(findings: Findings, out: Path) -> str:
-    """Say in a few lines what was found and where to read on."""
-    missed = sorted(set(findings.incorrect) - set(findings.flagged))
-    wrong = sorted(set(findings.flagged) - set(findings.incorrect))
+def summary(result: DemoResult, out: Path) -> str:
+    """Write in a few lines what was found and where the report is."""
+    missed = sorted(set(result.incorrect) - set(result.flagged))
+    wrong = sorted(set(result.flagged) - set(result.incorrect))
     lines = [
-        f"flagged:    {_listed(findings.flagged)}",
-        f"incorrect:  {_listed(findings.incorrect)}   (by the labels of the pool)",
+        f"flagged:    {_listed(result.flagged)}",
+        f"incorrect:  {_listed(result.incorrect)}   (by the labels of the pool)",
         f"missed:     {_listed(missed)}   falsely flagged: {_listed(wrong)}",
-        *(f"policy on {name}:\n{rates(by_mode)}" for name, by_mode in findings.scores.items()),
-        *sentences(findings.scores),
+        *(f"policy on {name}:\n{rates(by_mode)}" for name, by_mode in result.scores.items()),
+        *sentences(result.scores),
         f"report:     {out / 'report.html'}",
     ]
     return "\n".join(lines)

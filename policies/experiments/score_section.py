@@ -1,4 +1,4 @@
-"""The report's section on policies: what was found in words, a dot-and-whisker plot, a table."""
+"""The report's section on policies: sentences, a dot-and-whisker plot and a table."""
 
 from collections.abc import Iterator, Mapping
 from html import escape
@@ -6,7 +6,7 @@ from html import escape
 from policies.play.evaluation import Scores
 from teasim.common.statistics import Rate
 
-Comparison = Mapping[str, Mapping[str, Scores]]
+ScoresBySet = Mapping[str, Mapping[str, Scores]]
 """Training set -> mode -> scores; the others are compared with the first training set."""
 
 ROW = 26
@@ -16,16 +16,17 @@ LABELS = 300
 AXIS = 400
 """Width of the plot's axis, 0 to 100 % [px]."""
 COLOURS = ("#b4552d", "#2f6f8f", "#5a7d3a")
+"""Colours of the training sets, CSS."""
 
 
-def score_section(scores: Comparison) -> str:
-    """Render `scores` as HTML that needs nothing from outside."""
+def score_section(scores: ScoresBySet) -> str:
+    """Render `scores` as self-contained HTML."""
     words = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences(scores))
     return f"{words}\n{_plot(scores)}\n{_table(scores)}"
 
 
-def sentences(scores: Comparison) -> list[str]:
-    """Say in plain words, per mode, what leaving demonstrations out did to the policy accuracy."""
+def sentences(scores: ScoresBySet) -> list[str]:
+    """Write, per mode, how the policy accuracy changed when demonstrations were left out."""
     base, *others = scores
     found = [
         _compare(mode, base, scores[base][mode].policy_accuracy, name, other.policy_accuracy)
@@ -51,7 +52,7 @@ def _compare(mode: str, base: str, before: Rate, name: str, after: Rate) -> str:
     return f"With {mode} decisions: {numbers}; {verdict}."
 
 
-def _rows(scores: Comparison) -> Iterator[tuple[int, str, Scores]]:
+def _rows(scores: ScoresBySet) -> Iterator[tuple[int, str, Scores]]:
     """Yield (number of the training set, label, scores), mode by mode."""
     modes = next(iter(scores.values()))
     for mode in modes:
@@ -59,7 +60,7 @@ def _rows(scores: Comparison) -> Iterator[tuple[int, str, Scores]]:
             yield number, f"{name}, {mode}", by_mode[mode]
 
 
-def _plot(scores: Comparison) -> str:
+def _plot(scores: ScoresBySet) -> str:
     rows = list(_rows(scores))
     height = ROW * len(rows)
     marks = [_tick(percent, height) for percent in range(0, 101, 20)]
@@ -98,16 +99,18 @@ def _whisker(y: int, colour: str, label: str, rate: Rate) -> str:
     )
 
 
-def _table(scores: Comparison) -> str:
-    heads = ("trained on, decisions", "policy accuracy", "lenient", "goal reached", "oven left on")
-    head = "".join(f"<th>{name}</th>" for name in heads)
-    body = "".join(
-        "<tr>"
-        + "".join(
-            f"<td>{escape(str(cell))}</td>"
-            for cell in (label, s.policy_accuracy, s.lenient_accuracy, s.success, s.unsafe)
-        )
-        + "</tr>"
-        for _, label, s in _rows(scores)
-    )
+def _table(scores: ScoresBySet) -> str:
+    """Render all rates, with a column for each kind of violation in the environment's words."""
+    rows = list(_rows(scores))
+    kinds = list(dict.fromkeys(kind for _, _, s in rows for kind in s.violations))
+    heads = ("trained on, decisions", "policy accuracy", "lenient", "goal reached", *kinds)
+    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    body = "".join(f"<tr>{_cells(label, s, kinds)}</tr>" for _, label, s in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _cells(label: str, scores: Scores, kinds: list[str]) -> str:
+    rates = (scores.policy_accuracy, scores.lenient_accuracy, scores.success)
+    violations = (scores.violations.get(kind, "never") for kind in kinds)
+    texts = (label, *map(str, rates), *map(str, violations))
+    return "".join(f"<td>{escape(text)}</td>" for text in texts)

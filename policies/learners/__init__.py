@@ -1,1 +1,1 @@
-"""The learners, one file each, and what their networks are made of."""
+"""The learners, one file each, and the networks and policies they produce."""

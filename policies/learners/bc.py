@@ -3,7 +3,6 @@
 The paper, section 4.3: the policy infers the next sub-task given the current state.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,16 +13,17 @@ from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
 from filtering.vision.determinism import one_thread
+from policies.data.moments import weighted_moments
 from policies.data.samples import DecisionSamples
-from policies.data.weighting import weigh, weighted_loss, weighted_moments
+from policies.data.weighting import weigh, weighted_loss
 from policies.learners.networks import DecisionNetwork, NetworkShape
 from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
 
 STEPS_WITH_PICTURES = 120
-"""Gradient steps that are enough for feature maps in several views."""
+"""Default number of gradient steps with feature maps in several views."""
 STEPS_FROM_STATE = 500
-"""Gradient steps from the few numbers of the state, which tell less and cost little."""
+"""Default number of gradient steps from the state alone, which needs more and cheaper steps."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class BCConfig:
     """Settings of behaviour cloning."""
 
     bottleneck: int = 32
-    """Channels per camera that the feature maps are reduced to."""
+    """Channels per camera after the 1x1 bottleneck."""
     steps: int | None = None
-    """Gradient steps, each on all decisions in one of their views; None: STEPS_WITH_PICTURES, or
-    STEPS_FROM_STATE where there are none."""
+    """Gradient steps, each on all decisions in one of their views; None: 120 with pictures, 500
+    from the state alone."""
     learning_rate: float = 6e-3
     """Step size of AdamW."""
     weight_decay: float = 0.1
@@ -56,8 +56,8 @@ class BCConfig:
 class BC:
     """minimise over theta: sum_i w_i [-log pi_theta(t_i | s_i)], with sum_i w_i = 1.
 
-    Every step takes all decisions, in one of their views after the other, on one thread: a seed and
-    a set of weighted decisions give one result.
+    Every step takes all decisions, in one view after the other, on one thread, so a seed and a set
+    of weighted decisions determine the result.
     """
 
     policy_: SubtaskPolicy
@@ -76,13 +76,13 @@ class BC:
         samples, shares = weigh(samples, weights)
         network = DecisionNetwork(shape_for(samples, self.config.bottleneck), self.config.seed)
         network.standardise(weighted_moments(samples, shares))
-        self.history_ = clone(network, network, samples, shares, self.config)
+        self.history_ = clone(network, samples, shares, self.config)
         self.policy_ = SubtaskPolicy(network, samples.spec, samples.action_names)
         return self
 
 
 def shape_for(samples: DecisionSamples, bottleneck: int) -> NetworkShape:
-    """Sizes of a network that looks at `samples`."""
+    """Sizes of a network for `samples`."""
     return NetworkShape(
         cameras=samples.maps.shape[2],
         channels=samples.maps.shape[3],
@@ -94,15 +94,20 @@ def shape_for(samples: DecisionSamples, bottleneck: int) -> NetworkShape:
 
 def clone(
     network: nn.Module,
-    logits_of: Callable[[Tensor, Tensor], Tensor],
     samples: DecisionSamples,
     shares: NDArray[np.float64],
     config: BCConfig,
+    **inputs: Tensor,
 ) -> tuple[float, ...]:
-    """Descend sum_i shares_i [-log pi(t_i | s_i)] and return its value before every step.
+    """Minimise sum_i shares_i [-log pi(t_i | s_i)] and return its value before every step.
 
-    `logits_of` (maps (n, K, C, h, w), state (n, S)) -> (n, A) asks `network`, whose parameters are
-    changed; `shares` (n,) sum to 1.
+    Args:
+        network: (maps (n, K, C, h, w), state (n, S), **inputs) -> logits (n, A); its parameters are
+            changed.
+        samples: n decisions.
+        shares: share of the total weight of each decision, (n,), sum 1.
+        config: number of steps and settings of the optimiser.
+        inputs: further inputs of the network, the same in every step.
     """
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
@@ -115,7 +120,7 @@ def clone(
         for step in range(config.steps or _usual_steps(samples)):
             maps = torch.from_numpy(samples.maps[:, step % samples.maps.shape[1]].copy())
             optimizer.zero_grad()
-            losses = cross_entropy(logits_of(maps, low_dim), labels, reduction="none")
+            losses = cross_entropy(network(maps, low_dim, **inputs), labels, reduction="none")
             loss = weighted_loss(losses, weights)
             loss.backward()
             optimizer.step()

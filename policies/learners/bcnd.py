@@ -1,9 +1,9 @@
 """Behavioural cloning from noisy demonstrations (Sasaki & Yamashina, ICLR 2021).
 
-Algorithm 1: an ensemble is cloned in rounds, and each round weighs a decision by how likely the
-ensemble of the round before found it. What only a minority does gets ever less weight. They give
-every member its own part of the data; here every member sees all of it and differs by its initial
-weights, since a dozen demonstrations cannot be cut in five.
+Algorithm 1: an ensemble is cloned in rounds, and each round weights a decision by its probability
+under the ensemble of the previous round, so decisions of a minority lose weight. Sasaki & Yamashina
+give every member a part of the data of its own; here every member is trained on all of it and
+differs by its initial weights, because a dozen demonstrations are too few to divide by five.
 """
 
 from dataclasses import dataclass
@@ -14,8 +14,9 @@ import torch
 from numpy.typing import NDArray
 
 from filtering.vision.determinism import one_thread
+from policies.data.moments import weighted_moments
 from policies.data.samples import DecisionSamples
-from policies.data.weighting import weigh, weighted_moments
+from policies.data.weighting import weigh
 from policies.learners.bc import BCConfig, clone, shape_for
 from policies.learners.networks import Ensemble
 from policies.learners.subtask_policy import SubtaskPolicy
@@ -27,11 +28,11 @@ class BCNDConfig(BCConfig):
     """Settings of behavioural cloning from noisy demonstrations."""
 
     steps: int = 40
-    """Gradient steps of every member in every round; each round goes on where the last stopped."""
+    """Gradient steps of every member in every round; a round continues from the previous one."""
     members: int = 5
-    """Policies in the ensemble."""
+    """Number of policies in the ensemble."""
     rounds: int = 5
-    """Rounds; the first is plain behaviour cloning."""
+    """Number of rounds; the first is plain behaviour cloning."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value that cannot train."""
@@ -43,8 +44,8 @@ class BCNDConfig(BCConfig):
 class BCND:
     """minimise over theta, in rounds: - sum_i w_i pi_old(t_i | s_i) log pi_theta(t_i | s_i).
 
-    pi_old is the ensemble after the round before, 1 in the first. The products w_i pi_old are
-    scaled to sum 1, which changes no minimum.
+    pi_old is the ensemble after the previous round, 1 in the first. The products w_i pi_old are
+    scaled to sum 1, which does not change the minimum.
     """
 
     policy_: SubtaskPolicy
@@ -70,7 +71,7 @@ class BCND:
         for _ in range(config.rounds):
             products = shares * belief
             losses = [
-                clone(member, member, samples, products / products.sum(), config)
+                clone(member, samples, products / products.sum(), config)
                 for member in network.members
             ]
             history += np.mean(losses, axis=0).tolist()
@@ -81,7 +82,7 @@ class BCND:
 
 
 def _belief(network: Ensemble, samples: DecisionSamples) -> NDArray[np.float64]:
-    """Probability (n,) that `network` gives to what was chosen; mean over the views."""
+    """Probability (n,) of the chosen sub-tasks under `network`, averaged over the views."""
     low_dim = torch.from_numpy(samples.low_dim.copy())
     rows = np.arange(len(samples.labels))
     with torch.inference_mode(), one_thread():

@@ -1,11 +1,11 @@
-"""DemoDICE (Kim et al., ICLR 2022): what a few good demonstrations say about all the others.
+"""DemoDICE (Kim et al., ICLR 2022): imitation from a few expert and many supplementary demos.
 
-A few demonstrations E are known to be good; all of them together, U, show what can happen. Sought
-is the behaviour whose visits d come close to E's without straying from U's,
+The demonstrations E are known to be good; U is the union of all demonstrations. The method seeks a
+policy whose stationary distribution d is close to that of E without leaving that of U,
 
     max over d of  - KL(d || d_E) - alpha KL(d || d_U) .
 
-Three problems, one after another:
+Three problems are solved one after the other:
 
     (1) c:   min  - E_E[log c(s,a)] - E_U[log(1 - c(s,a))] + penalty E_U[(|grad c| - 1)^2],
              then r(s,a) = log c/(1-c), which estimates log d_E/d_U;
@@ -13,8 +13,9 @@ Three problems, one after another:
              where A(s,a,s') = r(s,a) + gamma nu(s') - nu(s);
     (3) pi:  max  E_U[exp(A/(1+alpha)) log pi(a|s)], behaviour cloning with those weights.
 
-After its last decision a demonstration stays in one absorbing state, as in their program. Kim et
-al. take the penalty between draws of E and U; here it is taken on U, so that nothing is drawn.
+After its last decision a demonstration stays in an absorbing state, as in the authors' program.
+Kim et al. evaluate the penalty at random mixtures of E and U; here it is evaluated on U, so that
+nothing is drawn.
 """
 
 from collections.abc import Callable
@@ -29,8 +30,9 @@ from torch import Tensor, nn
 from torch.nn.functional import logsigmoid
 
 from filtering.vision.determinism import one_thread
+from policies.data.moments import weighted_moments
 from policies.data.samples import DecisionSamples
-from policies.data.weighting import weigh, weighted_loss, weighted_moments
+from policies.data.weighting import weigh, weighted_loss
 from policies.learners.bc import BCConfig, clone, shape_for
 from policies.learners.networks import DecisionNetwork, Encoder
 from policies.learners.subtask_policy import SubtaskPolicy
@@ -39,20 +41,20 @@ from teasim.common.errors import ConfigError
 
 @dataclass(frozen=True)
 class DemoDICEConfig(BCConfig):
-    """Settings of DemoDICE; those of `BCConfig` are for its policy."""
+    """Settings of DemoDICE; those of `BCConfig` are for its policy, problem (3)."""
 
     experts: tuple[int, ...] = ()
     """E: places in the pool of demonstrations that are known to be good."""
     alpha: float = 0.05
-    """How much straying from U counts, beside straying from E."""
+    """Weight of the divergence from U relative to that from E, 0 or more."""
     gamma: float = 0.99
     """Discount per decision, in (0, 1)."""
     gradient_penalty: float = 0.1
-    """Strength of the penalty on the gradient of c."""
+    """Weight of the penalty on the gradient of c, 0 or more."""
     hidden: int = 64
     """Width of the two layers of c and nu; Kim et al. take 256 for a million decisions."""
     ratio_steps: int = 300
-    """Gradient steps for c, and again for nu, each on all decisions."""
+    """Gradient steps for c, and as many for nu, each on all decisions."""
     ratio_learning_rate: float = 3e-3
     """Step size of Adam for c and nu."""
 
@@ -71,14 +73,14 @@ class DemoDICEConfig(BCConfig):
 
 @dataclass(frozen=True)
 class Chain:
-    """n decisions and, as the last of m = n + 1 rows, the state nothing comes after."""
+    """n decisions and, as the last of m = n + 1 rows, the absorbing state."""
 
     states: Tensor
-    """Features of what was seen; the last one tells the absorbing state.  # (m, F + 1)"""
+    """Features of the state; the last feature marks the absorbing state.  # (m, F + 1)"""
     actions: Tensor
-    """What was chosen, one-hot; nothing in the absorbing state.  # (m, T)"""
+    """Chosen sub-task, one-hot; 0 in the absorbing state.  # (m, T)"""
     following: NDArray[np.int64]
-    """Row of the state that came next.  # (m,)"""
+    """Row of the next state.  # (m,)"""
     first: Tensor
     """Share of each row in the first states of demonstrations, sum 1.  # (m,)"""
     expert: Tensor
@@ -88,12 +90,12 @@ class Chain:
 
 
 class DemoDICE:
-    """Behaviour cloning, each decision weighted by how much it belongs to what experts do."""
+    """Behaviour cloning in which each decision is weighted by the estimate of d / d_U."""
 
     policy_: SubtaskPolicy
     history_: tuple[float, ...]
     decision_weights_: NDArray[np.float64]
-    """Estimate of d/d_U for each decision that counted, up to a factor.  # (n,)"""
+    """Estimate of d / d_U for each decision of positive weight, up to a factor.  # (n,)"""
 
     def __init__(self, config: DemoDICEConfig | None = None) -> None:
         """Keep the settings; `fit` does the work and never changes them."""
@@ -118,7 +120,7 @@ class DemoDICE:
         products = shares * self.decision_weights_
         network = DecisionNetwork(shape_for(samples, config.bottleneck), config.seed)
         network.standardise(moments)
-        self.history_ = clone(network, network, samples, products / products.sum(), config)
+        self.history_ = clone(network, samples, products / products.sum(), config)
         self.policy_ = SubtaskPolicy(network, samples.spec, samples.action_names)
         return self
 
@@ -129,7 +131,7 @@ def make_chain(
     shares: NDArray[np.float64],
     experts: tuple[int, ...],
 ) -> Chain:
-    """String the decisions of every demonstration together.
+    """Link the decisions of every demonstration in order.
 
     Raises:
         ConfigError: none of `experts` is among the demonstrations.
@@ -204,13 +206,13 @@ def learn_advantages(chain: Chain, rewards: Tensor, config: DemoDICEConfig) -> N
 
 
 def _visits(shares: NDArray[np.float64], ends: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Shares of n decisions and of the absorbing state, visited once per demonstration, sum 1."""
+    """Append the absorbing state, visited once per demonstration, to `shares` (n,); sum 1."""
     visits = np.append(shares, shares[ends].sum())
     return visits / visits.sum()
 
 
 def _network(inputs: int, hidden: int, seed: int) -> nn.Sequential:
-    """Two hidden layers and one output; initial weights from a generator of its own."""
+    """Two hidden layers and one output; the initial weights are drawn from `seed`."""
     random = torch.Generator().manual_seed(seed)
     sizes = (inputs, hidden, hidden, 1)
     layers: list[nn.Module] = []

@@ -1,9 +1,9 @@
-"""A policy over joint targets: it follows a demonstration, and looks where it is chunk by chunk.
+"""A policy over joint targets that follows a stored demonstration, chunk by chunk.
 
-Its memory is the step of a demonstration that comes next. Where an episode starts it follows the
-demonstration that is nearest to what it sees, or one drawn by how near they are and by their
-weights; after every chunk it gets back into step, or changes to a demonstration that is nearer by
-far.
+Its recurrent state is the next step of the demonstration. At the start of an episode it chooses the
+demonstration nearest to what it sees, or draws one with probabilities from distance and weight.
+After every chunk it moves to the step of the demonstration that fits best, or changes to another
+demonstration that is much nearer.
 """
 
 import numpy as np
@@ -12,13 +12,13 @@ from scipy.special import softmax
 
 from policies.data.motions import seen_numbers
 from policies.data.samples import Observation, RecurrentState, TrainedPolicy
-from policies.learners.chunks import Memory
+from policies.learners.store import DemonstrationStore
 
 
 class MotionPolicy(TrainedPolicy):
-    """Says where the joints go next; see `base.Policy`, with targets in the place of a choice."""
+    """Chooses joint targets; called like `policies.data.samples.Policy`."""
 
-    network: Memory
+    network: DemonstrationStore
 
     def predict(
         self,
@@ -29,7 +29,7 @@ class MotionPolicy(TrainedPolicy):
     ) -> tuple[NDArray[np.float32], RecurrentState | None]:
         """Return joint targets [rad; m for grippers], (J,) for one observation, (n, J) for n.
 
-        The memory after it, (n, 2), has the step that comes next and how many are left of the
+        The recurrent state afterwards, (n, 2), is the next step and the number of steps left in the
         chunk.
         """
         seen = seen_numbers(observation, self.spec)
@@ -59,7 +59,7 @@ class MotionPolicy(TrainedPolicy):
         memory: NDArray[np.float64],
         deterministic: bool,
     ) -> int:
-        """Return the step of a demonstration that is to be done now."""
+        """Return the row of the stored step to execute now."""
         if fresh:
             rows, costs = self.network.entries(seen)
             demo = costs.argmin() if deterministic else self._draw(-costs)

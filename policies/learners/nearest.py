@@ -1,10 +1,10 @@
-"""Behaviour cloning at the joint level by looking up: chunks of the nearest demonstration.
+"""Behaviour cloning at the joint level by nearest neighbours: chunks of the nearest demonstration.
 
 Visual imitation through nearest neighbours (Pari et al., "The Surprising Effectiveness of
 Representation Learning for Visual Imitation", RSS 2022, section III-C) from the state, with chunks
-of actions as in ACT (Zhao et al., RSS 2023). One neighbour instead of a mean of several: the mean
-of two good ways to reach for a cup can be one that knocks it over. Nothing is fitted but the scale
-of what is seen, so it cannot do what no demonstration did from a state like the present one.
+of actions as in ACT (Zhao et al., RSS 2023). One neighbour is followed instead of a mean of
+several: the mean of two good ways to reach for a cup may knock it over. Only the scale of the state
+is fitted, so the policy can do only what a demonstration did from a similar state.
 """
 
 import hashlib
@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from policies.data.motions import MotionSamples
 from policies.data.weighting import weigh
-from policies.learners.chunks import Memory, MemoryShape
 from policies.learners.motion_policy import MotionPolicy
+from policies.learners.store import DemonstrationStore, StoreShape
 from teasim.common.errors import ConfigError
 
 PROBED = 10
-"""Every so many control steps are looked up in the other demonstrations for the history."""
+"""Distance of the steps that are compared with the other demonstrations for the history [control
+steps]."""
 
 
 @dataclass(frozen=True)
@@ -30,18 +31,18 @@ class NearestConfig:
     """Settings of the nearest neighbour."""
 
     chunk: int = 8
-    """H, control steps (0.1 s) that are carried out before the next look."""
+    """H, control steps (0.1 s) that are executed before the next query."""
     seed: int = 0
-    """Nothing is drawn while learning; every learner has one."""
+    """Has no effect: nothing is drawn while learning."""
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a chunk of nothing."""
+        """Raise ConfigError for an empty chunk."""
         if self.chunk < 1:
             raise ConfigError(f"chunk is {self.chunk}; choose 1 or more.")
 
 
 class Nearest:
-    """Remember the demonstrations; `policy_` follows the nearest one."""
+    """Stores the demonstrations; `policy_` follows the nearest one."""
 
     policy_: MotionPolicy
     history_: tuple[float, ...]
@@ -62,24 +63,25 @@ class Nearest:
         demos = _different(samples, shares)
         low_dim, targets = (np.concatenate([demo[n] for demo in demos]) for n in (0, 1))
         stops = np.cumsum([len(demo[0]) for demo in demos])
-        shape = MemoryShape(
+        shape = StoreShape(
             len(low_dim), low_dim.shape[1], targets.shape[1], len(stops), self.config.chunk
         )
-        memory = Memory(shape)
-        memory.keep(low_dim, targets, stops, np.array([demo[2] for demo in demos]))
-        self.policy_ = MotionPolicy(memory, samples.spec, samples.action_names)
-        self.history_ = (_difference(memory),)
+        store = DemonstrationStore(shape)
+        store.keep(low_dim, targets, stops, np.array([demo[2] for demo in demos]))
+        self.policy_ = MotionPolicy(store, samples.spec, samples.action_names)
+        self.history_ = (_difference(store),)
         return self
 
 
 Demo = tuple[NDArray[np.float32], NDArray[np.float32], float]
+"""States (n, S), targets (n, J) and share of a demonstration."""
 
 
 def _different(samples: MotionSamples, shares: NDArray[np.float64]) -> list[Demo]:
-    """Return what was seen, the targets and the share of every different demonstration.
+    """Return states (n, S), targets (n, J) and share of every different demonstration.
 
-    Their order is that of their content, so that nothing depends on the order in the pool, and one
-    that is there twice is the same as one of twice the weight.
+    They are sorted by a hash of their content, so the result does not depend on the order in the
+    pool, and a demonstration that occurs twice equals one of twice the weight.
     """
     found: dict[bytes, Demo] = {}
     for demo in np.unique(samples.demos):
@@ -93,13 +95,13 @@ def _different(samples: MotionSamples, shares: NDArray[np.float64]) -> list[Demo
     return [(seen, targets, share / total) for _, (seen, targets, share) in sorted(found.items())]
 
 
-def _difference(memory: Memory) -> float:
-    """Return how far the nearest steps of other demonstrations are from what was done."""
-    edges, targets = memory.edges, memory.targets.numpy()
+def _difference(store: DemonstrationStore) -> float:
+    """Mean difference between targets and those of the nearest steps of other demonstrations."""
+    edges, targets = store.edges, store.targets.numpy()
     missed = []
     for demo, (start, stop) in enumerate(pairwise(edges)):
         for row in range(start, stop, PROBED):
-            rows, costs = memory.entries(memory.low_dim[row].numpy())
+            rows, costs = store.entries(store.low_dim[row].numpy())
             costs[demo] = np.inf
             if np.isfinite(costs).any():
                 missed.append(float(np.abs(targets[row] - targets[rows[costs.argmin()]]).mean()))

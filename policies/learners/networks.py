@@ -1,8 +1,8 @@
-"""The networks that score sub-tasks: what is where does not matter, only whether it is there.
+"""The networks that score sub-tasks, independent of where objects are in the picture.
 
-Things stand elsewhere in every demonstration, and a few dozen decisions cannot teach a network
-where they might stand. So each camera's feature maps go through a 1x1 bottleneck and a maximum over
-the picture, as in the paper's section 3.2, and one linear layer chooses.
+Objects are placed differently in every demonstration, and a few dozen decisions are too few to
+learn every placement. So the feature maps of each camera go through a 1x1 bottleneck and a maximum
+over the picture, as in section 3.2 of the paper, and one linear layer scores the sub-tasks.
 """
 
 import math
@@ -17,12 +17,12 @@ from torch import Tensor, nn
 from policies.data.moments import Moments
 
 MAP_SCALE_FLOOR = 0.05
-"""Least scale of a channel of the feature maps; one that never changes must not become noise."""
+"""Least scale of a channel of the feature maps, so that a constant channel is not amplified."""
 LOW_DIM_SCALE_FLOOR = 0.2
-"""Least scale of a joint position or another number of the state [its unit]: at rest they hardly
-differ, and things stand a few centimetres elsewhere in every scene, which means nothing."""
+"""Least scale of a number of the state [its unit]: joint positions at rest hardly vary, and the
+placement of objects varies by a few centimetres, neither of which decides the next sub-task."""
 
-Memory = tuple[Tensor, ...]
+HiddenState = tuple[Tensor, ...]
 """What a network carries from one decision of an episode to the next, (n, H) each; () if nothing.
 """
 
@@ -36,31 +36,34 @@ class NetworkShape:
     channels: int
     """C, channels of the feature maps."""
     low_dim: int
-    """S, numbers of the state beside the pictures; 0 without."""
+    """S, numbers of the state besides the pictures; may be 0."""
     bottleneck: int
-    """B, channels behind the bottleneck; 0: there is none, and the C channels stay as they are."""
+    """B, channels after the bottleneck; 0: no bottleneck, all C channels are kept."""
     actions: int
     """A, sub-tasks to choose from."""
 
     @property
     def features(self) -> int:
-        """F, length of what the encoder makes of an observation."""
+        """F, length of the encoded observation."""
         return self.cameras * (self.bottleneck or self.channels) + self.low_dim
 
 
 class SubtaskNetwork(Protocol):
-    """What a policy asks of its network."""
+    """What a policy needs of its network."""
 
     kind: ClassVar[str]
     """Name under which it is saved."""
     shape: NetworkShape
+    """Its sizes."""
 
     @property
     def settings(self) -> Mapping[str, int]:
-        """What beside the shape is needed to build it again."""
+        """Arguments besides shape and seed that are needed to build it again."""
 
-    def step(self, maps: Tensor, low_dim: Tensor, memory: Memory | None) -> tuple[Tensor, Memory]:
-        """Return logits (n, A) for one decision in each of n episodes, and the memory after it."""
+    def step(
+        self, maps: Tensor, low_dim: Tensor, hidden: HiddenState | None
+    ) -> tuple[Tensor, HiddenState]:
+        """Return logits (n, A) for a decision in each of n episodes, and the next hidden state."""
 
     def eval(self) -> nn.Module: ...  # noqa: D102  (torch's)
 
@@ -70,8 +73,8 @@ class SubtaskNetwork(Protocol):
 class Encoder(nn.Module):
     """Feature maps (n, K, C, h, w) and state (n, S) -> features (n, F).
 
-    The normaliser is part of the weights. Double precision, so that the order of a sum is not
-    amplified by the optimiser: equal training sets give equal parameters.
+    The normaliser is part of the weights. Double precision keeps the optimiser from amplifying
+    rounding differences in the order of sums, so equal training sets give equal parameters.
     """
 
     map_mean: Tensor
@@ -113,20 +116,20 @@ class Encoder(nn.Module):
 
 
 class Memoryless(nn.Module):
-    """A network that chooses from what is seen now, whatever came before."""
+    """A network whose logits depend on the current observation alone."""
 
     def step(
         self,
         maps: Tensor,
         low_dim: Tensor,
-        memory: Memory | None,  # noqa: ARG002  (the protocol's)
-    ) -> tuple[Tensor, Memory]:
-        """Return logits (n, A); nothing is remembered."""
+        hidden: HiddenState | None,  # noqa: ARG002  (the protocol's)
+    ) -> tuple[Tensor, HiddenState]:
+        """Return logits (n, A) and an empty hidden state."""
         return self(maps, low_dim), ()
 
 
 class DecisionNetwork(Memoryless):
-    """Feature maps (n, K, C, h, w) and state (n, S) -> logits (n, A), without memory."""
+    """Feature maps (n, K, C, h, w) and state (n, S) -> logits (n, A)."""
 
     kind: ClassVar[str] = "decision"
 
@@ -139,7 +142,7 @@ class DecisionNetwork(Memoryless):
 
     @property
     def settings(self) -> Mapping[str, int]:
-        """Nothing beside the shape."""
+        """Nothing is needed besides the shape."""
         return {}
 
     def standardise(self, moments: Moments) -> None:
@@ -153,7 +156,7 @@ class DecisionNetwork(Memoryless):
 
 
 class Ensemble(Memoryless):
-    """Networks that vote: the probability of a sub-task is the mean of the members'."""
+    """Networks whose probabilities are averaged."""
 
     kind: ClassVar[str] = "ensemble"
 
@@ -166,7 +169,7 @@ class Ensemble(Memoryless):
 
     @property
     def settings(self) -> Mapping[str, int]:
-        """How many members there are."""
+        """Number of members."""
         return {"members": len(self.members)}
 
     def standardise(self, moments: Moments) -> None:
@@ -175,13 +178,13 @@ class Ensemble(Memoryless):
             member.standardise(moments)  # type: ignore[operator]
 
     def forward(self, maps: Tensor, low_dim: Tensor) -> Tensor:
-        """Return logits (n, A) float64, here the logarithm of the mean probability."""
+        """Return logits (n, A) float64, the logarithm of the mean probability."""
         votes = torch.stack([member(maps, low_dim).log_softmax(dim=1) for member in self.members])
         return votes.logsumexp(dim=0) - math.log(len(votes))
 
 
 class RecurrentNetwork(nn.Module):
-    """Decisions of an episode, one after the other -> logits; an LSTM carries what was seen."""
+    """Decisions of an episode in order -> logits; an LSTM encodes what was seen before."""
 
     kind: ClassVar[str] = "recurrent"
 
@@ -199,7 +202,7 @@ class RecurrentNetwork(nn.Module):
 
     @property
     def settings(self) -> Mapping[str, int]:
-        """How much is remembered."""
+        """Size of the hidden state."""
         return {"hidden": self.hidden}
 
     def standardise(self, moments: Moments) -> None:
@@ -209,7 +212,7 @@ class RecurrentNetwork(nn.Module):
     def forward(self, maps: Tensor, low_dim: Tensor, episodes: Tensor) -> Tensor:
         """Return logits (n, A) float64 of n decisions.
 
-        `episodes` (n, 2) has each decision's episode (from 0, none left out) and its place in it.
+        `episodes` (n, 2) holds each decision's episode (numbered 0, 1, ...) and its place in it.
         """
         features = self.encoder(maps, low_dim)
         count, length = (episodes.amax(dim=0) + 1).tolist()
@@ -219,16 +222,18 @@ class RecurrentNetwork(nn.Module):
         logits: Tensor = self.head(remembered[episodes[:, 0], episodes[:, 1]])
         return logits
 
-    def step(self, maps: Tensor, low_dim: Tensor, memory: Memory | None) -> tuple[Tensor, Memory]:
-        """Return logits (n, A) and the memory (n, H), (n, H) of the LSTM: output and cell."""
+    def step(
+        self, maps: Tensor, low_dim: Tensor, hidden: HiddenState | None
+    ) -> tuple[Tensor, HiddenState]:
+        """Return logits (n, A) and the hidden state of the LSTM: output (n, H) and cell (n, H)."""
         features = self.encoder(maps, low_dim)[:, None]
-        before = None if memory is None else (memory[0][None], memory[1][None])
+        before = None if hidden is None else (hidden[0][None], hidden[1][None])
         remembered, (output, cell) = self.lstm(features, before)
         return self.head(remembered[:, 0]), (output[0], cell[0])
 
 
 def undecided_head(features: int, actions: int) -> nn.Linear:
-    """Return a layer (n, F) -> (n, A) that begins undecided: all sub-tasks have one chance."""
+    """Return a layer (n, F) -> (n, A) with zero weights: all sub-tasks start equally probable."""
     head = nn.Linear(features, actions, dtype=torch.float64)
     nn.init.zeros_(head.weight)
     nn.init.zeros_(head.bias)

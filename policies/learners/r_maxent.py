@@ -1,19 +1,19 @@
-"""Robust maximum-entropy behaviour cloning: whom to trust is learned together with the policy.
+"""Robust maximum-entropy behaviour cloning: demonstration weights are learned with the policy.
 
 Hussein, Crowe, Petrik & Begum (arXiv 2101.01251), and equation 3 of the paper:
 
     min over lambda, w of (1/M) sum_d w_d l_d(lambda)    s.t.    sum_d w_d = M,  0 <= w_d <= 1
 
 where l_d is demonstration d's mean of -log p_lambda(t|s), p_lambda(t|s) is proportional to
-exp(lambda_t . f(s)), and M is half of the demonstrations. As it stands the problem has no finite
-solution wherever the trusted half can be told apart, and weights that are 0 or 1. So lambda gets a
-ridge (feature expectations are matched up to a slack), and w an entropy of temperature tau,
+exp(lambda_t . f(s)), and M is half of the demonstrations. The problem has no finite solution if the
+sub-tasks of the trusted half are separable, and its weights are 0 or 1. So a ridge on lambda is
+added (feature expectations are matched up to a slack), and an entropy of w at temperature tau,
 
     (1/M) sum_d [w_d l_d(lambda) + tau (w_d log w_d + (1-w_d) log(1-w_d))] + ridge/2 |lambda|^2 ,
 
-which is cooled down. Both half-steps are exact: lambda is a convex problem, and
-w_d = sigmoid((nu - l_d) / tau) with nu from sum_d w_d = M. A demonstration that is given the weight
-a counts as a copies of it.
+and tau is lowered step by step. Both half-steps are exact: the problem in lambda is convex, and
+w_d = sigmoid((nu - l_d) / tau) with nu from sum_d w_d = M. A demonstration of given weight a counts
+as a copies of it.
 """
 
 from dataclasses import dataclass
@@ -22,19 +22,18 @@ from typing import Self
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize
-from scipy.special import expit, log_softmax
+from scipy.optimize import minimize
+from scipy.special import log_softmax
 
 from filtering.vision.determinism import one_thread
+from policies.data.moments import weighted_moments
 from policies.data.samples import DecisionSamples
-from policies.data.weighting import weigh, weighted_moments
+from policies.data.weighting import weigh
 from policies.learners.bc import shape_for
 from policies.learners.networks import DecisionNetwork
 from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
-
-REACH = 50.0
-"""Temperatures from the outermost loss at which a demonstration surely is in or out."""
+from teasim.common.trimming import soft_trim
 
 
 @dataclass(frozen=True)
@@ -42,20 +41,20 @@ class RMaxEntConfig:
     """Settings of robust maximum-entropy behaviour cloning."""
 
     trusted: float = 0.5
-    """M, as a share of all demonstrations."""
+    """M, as a share of all demonstrations, more than 0 and less than 1."""
     ridge: float = 1e-2
     """Strength of the ridge on lambda [nat]."""
     hottest: float = 1.0
-    """Temperature the weights start at [nat]; nearly equal weights."""
+    """First temperature [nat]; weights are nearly equal."""
     coldest: float = 0.01
-    """Temperature they end at [nat]; nearly 0 or 1."""
+    """Last temperature [nat]; weights are nearly 0 or 1."""
     steps: int = 24
-    """Temperatures from one to the other, a constant factor apart."""
+    """Number of temperatures from the first to the last, in geometric progression."""
     seed: int = 0
-    """Changes nothing: the problem starts at equal weights and nothing is drawn."""
+    """Has no effect: the problem starts at equal weights and nothing is drawn."""
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a value that poses no problem."""
+        """Raise ConfigError for a value out of range."""
         if not 0 < self.trusted < 1:
             raise ConfigError(f"trusted is {self.trusted}; choose more than 0 and less than 1.")
         if self.ridge <= 0 or self.steps < 1:
@@ -65,31 +64,31 @@ class RMaxEntConfig:
 
 
 @dataclass(frozen=True)
-class Rows:
-    """What is known about n decisions of D demonstrations."""
+class Problem:
+    """n decisions of D demonstrations, as equation 3 takes them."""
 
     features: NDArray[np.float64]
     """f(s).  # (n, F)"""
     labels: NDArray[np.int64]
     """Chosen sub-task t.  # (n,)"""
     demos: NDArray[np.int64]
-    """Demonstration of each, from 0 and none left out.  # (n,)"""
+    """Demonstration of each decision, numbered 0, 1, ...  # (n,)"""
     copies: NDArray[np.float64]
-    """How many times each demonstration counts.  # (D,)"""
+    """Number of times each demonstration counts.  # (D,)"""
     actions: int
-    """T, sub-tasks to choose from."""
+    """T, number of sub-tasks."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """What solves the problem."""
+    """Solution of a problem."""
 
     multipliers: NDArray[np.float64]
     """lambda.  # (F, T)"""
     weights: NDArray[np.float64]
     """w.  # (D,)"""
     history: tuple[float, ...]
-    """Weighted mean of the losses at the start and after each temperature [nat]."""
+    """Weighted mean of the losses before the first and after each temperature [nat]."""
 
 
 class RMaxEnt:
@@ -114,7 +113,7 @@ class RMaxEnt:
         network = DecisionNetwork(shape_for(samples, bottleneck=0), self.config.seed)
         network.standardise(weighted_moments(samples, shares))
         with one_thread():
-            solution = solve(_rows(network, samples, weights), self.config)
+            solution = solve(_problem(network, samples, weights), self.config)
         multipliers = torch.from_numpy(solution.multipliers.T.copy())
         network.head.weight.data.copy_(multipliers[:, :-1])
         network.head.bias.data.copy_(multipliers[:, -1])
@@ -124,55 +123,41 @@ class RMaxEnt:
         return self
 
 
-def solve(rows: Rows, config: RMaxEntConfig) -> Solution:
-    """Find lambda and w by turns while the temperature falls."""
-    trusted = config.trusted * rows.copies.sum()
-    weights = np.full(len(rows.copies), config.trusted)
-    multipliers = np.zeros((rows.features.shape[1], rows.actions))
-    history = [float(np.log(rows.actions))]
+def solve(problem: Problem, config: RMaxEntConfig) -> Solution:
+    """Solve for lambda and w in alternation while the temperature falls."""
+    trusted = config.trusted * problem.copies.sum()
+    weights = np.full(len(problem.copies), config.trusted)
+    multipliers = np.zeros((problem.features.shape[1], problem.actions))
+    history = [float(np.log(problem.actions))]
     for temperature in np.geomspace(config.hottest, config.coldest, config.steps):
-        multipliers = fit_multipliers(rows, weights / trusted, multipliers, config.ridge)
-        losses = demo_losses(rows, multipliers)
-        weights = trust(losses, rows.copies, trusted, temperature)
-        history.append(float(rows.copies * weights @ losses / trusted))
+        multipliers = fit_multipliers(problem, weights / trusted, multipliers, config.ridge)
+        losses = demo_losses(problem, multipliers)
+        weights = soft_trim(losses, problem.copies, trusted, temperature)
+        history.append(float(problem.copies * weights @ losses / trusted))
     return Solution(multipliers, weights, tuple(history))
 
 
-def demo_losses(rows: Rows, multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+def demo_losses(problem: Problem, multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
     """l_d(lambda) of every demonstration [nat], (D,)."""
-    surprise = -log_softmax(rows.features @ multipliers, axis=1)
-    chosen = surprise[np.arange(len(rows.labels)), rows.labels]
-    means: NDArray[np.float64] = np.bincount(rows.demos, chosen) / np.bincount(rows.demos)
+    surprise = -log_softmax(problem.features @ multipliers, axis=1)
+    chosen = surprise[np.arange(len(problem.labels)), problem.labels]
+    means: NDArray[np.float64] = np.bincount(problem.demos, chosen) / np.bincount(problem.demos)
     return means
 
 
-def trust(
-    losses: NDArray[np.float64], copies: NDArray[np.float64], trusted: float, temperature: float
-) -> NDArray[np.float64]:
-    """w_d = sigmoid((nu - l_d) / tau), (D,), with nu such that sum_d copies_d w_d = `trusted`."""
-
-    def surplus(level: float) -> float:
-        return float(copies @ expit((level - losses) / temperature) - trusted)
-
-    margin = REACH * temperature
-    level = brentq(surplus, losses.min() - margin, losses.max() + margin, xtol=1e-14)
-    weights: NDArray[np.float64] = expit((level - losses) / temperature)
-    return weights
-
-
 def fit_multipliers(
-    rows: Rows, weights: NDArray[np.float64], start: NDArray[np.float64], ridge: float
+    problem: Problem, weights: NDArray[np.float64], start: NDArray[np.float64], ridge: float
 ) -> NDArray[np.float64]:
     """Minimise sum_d copies_d weights_d l_d(lambda) + ridge/2 |lambda|^2 over lambda, (F, T)."""
-    each = (rows.copies * weights / np.bincount(rows.demos))[rows.demos]
-    chosen = np.eye(rows.actions)[rows.labels]
+    each = (problem.copies * weights / np.bincount(problem.demos))[problem.demos]
+    chosen = np.eye(problem.actions)[problem.labels]
 
     def objective(flat: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         multipliers = flat.reshape(start.shape)
-        logs = log_softmax(rows.features @ multipliers, axis=1)
+        logs = log_softmax(problem.features @ multipliers, axis=1)
         value = -each @ (logs * chosen).sum(axis=1) + ridge / 2 * flat @ flat
         # The gradient is the gap between the model's feature expectations and the demonstrations'.
-        gap = rows.features.T @ (each[:, None] * (np.exp(logs) - chosen))
+        gap = problem.features.T @ (each[:, None] * (np.exp(logs) - chosen))
         return float(value), (gap + ridge * multipliers).ravel()
 
     options = {"maxiter": 5000, "maxfun": 10000, "ftol": 0.0, "gtol": 1e-12}
@@ -181,8 +166,10 @@ def fit_multipliers(
     return multipliers
 
 
-def _rows(network: DecisionNetwork, samples: DecisionSamples, weights: NDArray[np.float64]) -> Rows:
-    """Every view of every decision, as the network sees it, with a constant feature at the end."""
+def _problem(
+    network: DecisionNetwork, samples: DecisionSamples, weights: NDArray[np.float64]
+) -> Problem:
+    """Encode every view of every decision and append a constant feature."""
     low_dim = torch.from_numpy(samples.low_dim.copy())
     n_views = samples.maps.shape[1]
     with torch.inference_mode():
@@ -192,7 +179,7 @@ def _rows(network: DecisionNetwork, samples: DecisionSamples, weights: NDArray[n
         ]
     features = np.concatenate(views)
     present, demos = np.unique(samples.demos, return_inverse=True)
-    return Rows(
+    return Problem(
         np.hstack([features, np.ones((len(features), 1))]),
         np.tile(samples.labels, n_views),
         np.tile(demos, n_views),

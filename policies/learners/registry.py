@@ -1,4 +1,4 @@
-"""The learners by name; a new learner is one line here and one file beside this one."""
+"""The learners by name; a new learner is one row here and one file beside this one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -16,18 +16,25 @@ from policies.learners.r_maxent import RMaxEnt, RMaxEntConfig
 from teasim.common.errors import ConfigError
 from teasim.common.registry import named
 
+EXPERTS = "experts"
+"""Need of a learner that must be told which demonstrations are known to be good."""
+LOG = "log"
+"""Need of a learner whose pool must log joint positions and targets."""
+GIVEN_ELSEWHERE = ("seed", "experts")
+"""Settings that have an option of their own (--seed, --expert) and are not a learner's options."""
+
 
 class Learner(Protocol):
     """Turns weighted samples into a policy; learned attributes end in an underscore.
 
-    At the sub-task level the samples are `base.DecisionSamples` and the policy a `SubtaskPolicy`,
-    at the joint level `motions.MotionSamples` and a `MotionPolicy`.
+    At the sub-task level the samples are `DecisionSamples` and the policy is a `SubtaskPolicy`, at
+    the joint level `MotionSamples` and a `MotionPolicy`.
     """
 
     config: Any
     """Frozen settings; `fit` never changes them."""
     policy_: Any
-    """What was learned."""
+    """The learned policy."""
     history_: Sequence[float]
     """Training loss of each step [nat per decision; spreads of a joint target]."""
 
@@ -37,17 +44,23 @@ class Learner(Protocol):
 
 @dataclass(frozen=True)
 class LearnerKind:
-    """A learner and the settings it takes; every settings class has a field `seed`."""
+    """A learner, its settings, and what it needs; every settings class has a field `seed`."""
 
     learner: type[Any]
+    """Class with the method `fit`."""
     config: type[Any]
+    """Dataclass of its settings."""
     levels: tuple[str, ...]
-    """Levels it learns at: `subtask` (which sub-task comes next), `joint` (where the joints go)."""
+    """Levels at which it learns: `subtask` (the next sub-task), `joint` (the joint targets)."""
+    needs: tuple[str, ...] = ()
+    """Needs besides weighted samples: `experts` (`config` then has a field `experts`: places
+    in the pool of demonstrations known to be good), `log` (a joint log in the pool)."""
 
     @property
-    def takes_experts(self) -> bool:
-        """Whether it has to be told of demonstrations that are known to be good."""
-        return "experts" in {field.name for field in fields(self.config)}
+    def options(self) -> tuple[str, ...]:
+        """Names of the settings that `--set` and the tables of an ablation take."""
+        names = [field.name for field in fields(self.config)]
+        return tuple(name for name in names if name not in GIVEN_ELSEWHERE)
 
     def make(self, **settings: Any) -> Learner:
         """Build the learner with `settings` of its config."""
@@ -59,8 +72,8 @@ LEARNERS = {
     "bc": LearnerKind(BC, BCConfig, ("subtask",)),
     "bc-rnn": LearnerKind(BCRNN, BCRNNConfig, ("subtask",)),
     "bcnd": LearnerKind(BCND, BCNDConfig, ("subtask",)),
-    "demodice": LearnerKind(DemoDICE, DemoDICEConfig, ("subtask",)),
-    "nearest": LearnerKind(Nearest, NearestConfig, ("joint",)),
+    "demodice": LearnerKind(DemoDICE, DemoDICEConfig, ("subtask",), needs=(EXPERTS,)),
+    "nearest": LearnerKind(Nearest, NearestConfig, ("joint",), needs=(LOG,)),
     "r-maxent": LearnerKind(RMaxEnt, RMaxEntConfig, ("subtask",)),
 }
 
@@ -69,7 +82,7 @@ def find_learner(name: str, level: str) -> LearnerKind:
     """Return the learner called `name` if it learns at `level`.
 
     Raises:
-        ConfigError: no such learner, or not at that level.
+        ConfigError: there is no such learner, or it does not learn at that level.
     """
     kind = named("learner", LEARNERS, name)
     if level not in kind.levels:
@@ -77,3 +90,8 @@ def find_learner(name: str, level: str) -> LearnerKind:
             f"The learner '{name}' has no level '{level}'; choose {', '.join(kind.levels)}."
         )
     return kind
+
+
+def learners_that_need(need: str) -> list[str]:
+    """Names of the learners with `need` in their row."""
+    return [name for name, kind in LEARNERS.items() if need in kind.needs]

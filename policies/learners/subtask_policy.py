@@ -1,4 +1,4 @@
-"""A policy over sub-tasks: features of what is seen -> network -> softmax -> a choice."""
+"""A policy over sub-tasks: observation -> features -> network -> softmax -> sub-task."""
 
 import numpy as np
 import torch
@@ -18,7 +18,7 @@ from policies.learners.networks import SubtaskNetwork
 
 
 class SubtaskPolicy(TrainedPolicy):
-    """Chooses the next sub-task from what is seen (the paper, section 4.3)."""
+    """Chooses the next sub-task from an observation (the paper, section 4.3)."""
 
     network: SubtaskNetwork
 
@@ -29,11 +29,11 @@ class SubtaskPolicy(TrainedPolicy):
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], RecurrentState | None]:
-        """Choose the likeliest sub-task, or draw one; see `base.Policy.predict`."""
+        """Choose the most probable sub-task, or sample one; see `policies.data.samples.Policy`."""
         chances, memory = self.probabilities(observation, state, episode_start)
         if deterministic:
             return chances.argmax(axis=-1), memory
-        # Inverse transform: one uniform number per observation, so a batch equals a loop.
+        # Inverse transform sampling with one uniform number per observation: a batch equals a loop.
         edges = np.cumsum(chances, axis=-1)
         draws = self._random.random(chances.shape[:-1])[..., None] * edges[..., -1:]
         return (edges > draws).argmax(axis=-1), memory
@@ -46,7 +46,7 @@ class SubtaskPolicy(TrainedPolicy):
     ) -> tuple[NDArray[np.float64], RecurrentState | None]:
         """Probability of every sub-task, (A,) for one observation and (n, A) for a batch.
 
-        The second value is the memory after the decision, None for a policy without one.
+        The second value is the recurrent state after the decision, None for a policy without one.
         """
         maps, low_dim, single = _look(observation, self.spec)
         if state is not None and episode_start is not None:
@@ -71,7 +71,7 @@ class SubtaskPolicy(TrainedPolicy):
 def _look(
     observation: Observation, spec: ObservationSpec
 ) -> tuple[Maps, NDArray[np.float32], bool]:
-    """Return maps (n, K, C, h, w), state (n, S), and whether it was one observation, no batch."""
+    """Return maps (n, K, C, h, w), state (n, S), and whether it is a single observation."""
     if not spec.cameras:
         parts = [np.asarray(observation[key]) for key in STATE_KEYS]
         numbers = np.concatenate(parts, axis=-1)

@@ -1,8 +1,8 @@
 """Two policies on the same episodes: a difference is judged seed by seed.
 
-Both start in the same scenes, so what makes a scene hard falls out of the comparison. Whether an
-episode reached the goal, or left the oven on, is compared by McNemar's exact test; the policy
-accuracy by resampling the pairs of episodes.
+Both policies start in the same scenes, so the difficulty of a scene cancels. Goals reached and
+violations are compared by McNemar's exact test, the policy accuracy by resampling the pairs of
+episodes.
 """
 
 from collections.abc import Mapping
@@ -10,25 +10,32 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from policies.play.evaluation import Scores
+from policies.play.rollout import Episode
 from teasim.common.errors import ConfigError
 from teasim.common.statistics import Difference, bootstrap_difference, mcnemar
 
 
 @dataclass(frozen=True)
 class Discordance:
-    """What one policy did and the other did not, counted over the same episodes."""
+    """Episodes in which an event occurred with one policy and not with the other."""
 
     first: int
-    """Episodes in which the first alone did it."""
+    """Episodes in which it occurred with the first policy only."""
     second: int
-    """Episodes in which the second alone did it."""
+    """Episodes in which it occurred with the second policy only."""
     p_value: float
-    """Chance of so uneven a split if the policies were alike (McNemar's exact test)."""
+    """Probability of a split at least as uneven for equal policies (McNemar's exact test)."""
+
+    def __str__(self) -> str:
+        return (
+            f"with this one only in {self.first} episodes, with the other only in {self.second}, "
+            f"p = {self.p_value:.3f}"
+        )
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """The first policy beside the second, in one mode."""
+    """The first policy against the second, in one mode."""
 
     mode: str
     """`deterministic` or `sampled` decisions."""
@@ -38,15 +45,15 @@ class Comparison:
     """Policy accuracy (strict) of the first minus that of the second."""
     success: Discordance
     """Episodes that reached the goal."""
-    unsafe: Discordance
-    """Episodes that ended with the oven on."""
+    violations: dict[str, Discordance]
+    """Per kind of violation, in the environment's words: episodes in which it occurred."""
 
 
 def compare(first: Mapping[str, Scores], second: Mapping[str, Scores]) -> tuple[Comparison, ...]:
     """Compare the scores of two policies mode by mode.
 
     Raises:
-        ConfigError: they were not played on the same seeds.
+        ConfigError: they were not evaluated on the same seeds.
     """
     return tuple(_compare(first[mode], second[mode]) for mode in first)
 
@@ -55,11 +62,10 @@ def comparison_text(comparisons: tuple[Comparison, ...], other: str) -> str:
     """Write the comparisons with the policy called `other` in a few lines."""
     lines = []
     for c in comparisons:
+        found = {"policy accuracy": c.policy_accuracy, "goal reached": c.success, **c.violations}
         lines += [
-            f"{c.mode} decisions, beside {other} on the same {c.episodes} episodes",
-            f"  policy accuracy  {c.policy_accuracy}",
-            f"  goal reached     {_text(c.success)}",
-            f"  oven left on     {_text(c.unsafe)}",
+            f"{c.mode} decisions, against {other} on the same {c.episodes} episodes",
+            *(f"  {words:<16} {difference}" for words, difference in found.items()),
         ]
     return "\n".join(lines)
 
@@ -72,28 +78,28 @@ def comparison_json(comparisons: tuple[Comparison, ...]) -> dict[str, Any]:
 def _compare(first: Scores, second: Scores) -> Comparison:
     if [e.seed for e in first.episodes] != [e.seed for e in second.episodes]:
         raise ConfigError("Two policies can only be compared on the same seeds.")
+
+    pairs = list(zip(first.episodes, second.episodes, strict=True))
+    kinds = dict.fromkeys([*first.violations, *second.violations])
     return Comparison(
         first.mode,
         len(first.episodes),
         bootstrap_difference(_correct(first), _correct(second)),
-        _discordance([e.success for e in first.episodes], [e.success for e in second.episodes]),
-        _discordance([e.unsafe for e in first.episodes], [e.unsafe for e in second.episodes]),
+        _discordance([(one.success, two.success) for one, two in pairs]),
+        {kind: _discordance([_occurred(kind, pair) for pair in pairs]) for kind in kinds},
     )
+
+
+def _occurred(kind: str, pair: tuple[Episode, Episode]) -> tuple[bool, bool]:
+    """Whether a kind of violation occurred in each episode of a pair."""
+    return pair[0].kinds.get(kind, False), pair[1].kinds.get(kind, False)
+
+
+def _discordance(pairs: list[tuple[bool, bool]]) -> Discordance:
+    only_first, only_second = pairs.count((True, False)), pairs.count((False, True))
+    return Discordance(only_first, only_second, mcnemar(only_first, only_second))
 
 
 def _correct(scores: Scores) -> list[tuple[int, int]]:
     """Correct and all actions of every episode."""
     return [(episode.n_correct, len(episode.actions)) for episode in scores.episodes]
-
-
-def _discordance(first: list[bool], second: list[bool]) -> Discordance:
-    pairs = list(zip(first, second, strict=True))
-    one, two = pairs.count((True, False)), pairs.count((False, True))
-    return Discordance(one, two, mcnemar(one, two))
-
-
-def _text(found: Discordance) -> str:
-    return (
-        f"in {found.first} episodes by this one alone, in {found.second} by the other alone, "
-        f"p = {found.p_value:.3f}"
-    )

@@ -1,80 +1,59 @@
-"""Scores of a policy: policy accuracy (the paper, section 4.3), success, safety, completion.
+"""Scores of a policy over sub-tasks: policy accuracy (the paper, section 4.3), success, violations.
 
-Each episode is played twice: with the likeliest sub-task at every decision, and with a drawn one.
-The first can outvote a minority of incorrect demonstrations, the second shows what was learned from
-them.
+Each episode is run twice: with the most probable sub-task at every decision, and with a sampled
+one. The first can outvote a minority of incorrect demonstrations, the second shows what was learned
+from them.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
 from filtering.vision.determinism import one_thread
-from policies.data.samples import ObservationSpec, Policy
+from policies.data.samples import Policy
+from policies.play.environments import worlds
 from policies.play.outcomes import Outcomes, tally
-from policies.play.remembering import Remembering, can_remember
-from policies.play.rollout import EnvironmentConfig, Episode, make_environment, run_episode
+from policies.play.rollout import Episode, run_episode
+from policies.settings import EvaluationConfig
 from teasim.common import parallel
-from teasim.common.errors import ConfigError
 from teasim.common.statistics import Rate, grouped_rate
 
 MODES = ("deterministic", "sampled")
+"""How decisions are made: the most probable sub-task, or one drawn from the probabilities."""
 
 EPISODES_PER_BATCH = 4
 """Episodes that share one environment: few enough to keep all workers busy until the end."""
 
-World = Callable[[ObservationSpec], gym.Env[Any, Any]]
-"""Gives the environment in which policies that see so play."""
-
-
-@dataclass(frozen=True)
-class EvaluationConfig:
-    """How a policy is tried out."""
-
-    episodes: int = 50
-    """Episodes per mode."""
-    seed: int = 1000
-    """Seed of the first episode; the others follow."""
-    environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
-    """The world."""
-    video: Path | None = None
-    """Folder for what the policy saw in the deterministic episodes."""
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number of episodes that is no number of episodes."""
-        if self.episodes < 1:
-            raise ConfigError(f"episodes is {self.episodes}; choose 1 or more.")
-
 
 @dataclass(frozen=True)
 class Scores(Outcomes):
-    """What the episodes of one mode come to; all rates with 95 % intervals."""
+    """Scores of one mode; all rates with 95 % intervals."""
 
-    mode: str
-    """`deterministic` or `sampled` decisions."""
     episodes: tuple[Episode, ...]
     """The episodes, in the order of their seeds."""
     policy_accuracy: Rate
-    """Share of executed actions that are the reference's (Seq_1) next step (strict)."""
+    """Share of executed actions that are the reference's (Seq_1) next sub-task (strict)."""
     lenient_accuracy: Rate
     """Share of executed actions that the precedence of the sub-tasks allows."""
 
 
 @dataclass(frozen=True)
-class Batch:
-    """Scenes that one worker plays one after the other."""
+class SubtaskBatch:
+    """Scenes that one worker runs one after the other."""
 
     policies: tuple[Policy, ...]
+    """Policies that act in every scene."""
     seeds: tuple[int, ...]
+    """Seeds of the scenes."""
     config: EvaluationConfig
+    """Settings of the evaluation."""
 
 
 def evaluate(policy: Policy, config: EvaluationConfig, *, jobs: int = 1) -> dict[str, Scores]:
-    """Try `policy` in both modes; the result does not depend on `jobs`.
+    """Score `policy` in both modes; the result does not depend on `jobs`.
 
     Raises:
         CheckpointError: the policy was trained for another environment.
@@ -86,7 +65,7 @@ def evaluate(policy: Policy, config: EvaluationConfig, *, jobs: int = 1) -> dict
 def evaluate_all(
     policies: Sequence[Policy], config: EvaluationConfig, *, jobs: int = 1
 ) -> list[dict[str, Scores]]:
-    """Try all `policies` in the same scenes; what they do alike is carried out once.
+    """Score all `policies` in the same scenes; decisions they share are simulated once.
 
     Each gets the scores that `evaluate` gives it alone. Only the first is filmed.
 
@@ -95,7 +74,7 @@ def evaluate_all(
         ConfigError: the environment cannot be made.
     """
     work = [
-        Batch(tuple(policies), seeds, config)
+        SubtaskBatch(tuple(policies), seeds, config)
         for seeds in batches(range(config.seed, config.seed + config.episodes))
     ]
     parts = parallel.run(_play_batch, work, jobs=jobs, description="episodes")
@@ -108,25 +87,10 @@ def evaluate_all(
     ]
 
 
-@contextmanager
-def worlds(config: EnvironmentConfig, *, filmed: bool = False) -> Iterator[World]:
-    """Open what gives policies their environments; those that see alike share one."""
-    with ExitStack() as stack:
-        made: dict[ObservationSpec, gym.Env[Any, Any]] = {}
-
-        def world(spec: ObservationSpec) -> gym.Env[Any, Any]:
-            if spec not in made:
-                env = stack.enter_context(closing(make_environment(config, spec, filmed=filmed)))
-                made[spec] = Remembering(env) if can_remember(env) else env
-            return made[spec]
-
-        yield world
-
-
 def play(
     env: gym.Env[Any, Any], policy: Policy, seeds: Sequence[int], film: Path | None = None
 ) -> dict[str, list[Episode]]:
-    """Play the scenes `seeds` in both modes; `film` is a folder for the deterministic ones."""
+    """Run the scenes `seeds` in both modes; `film` is a folder for the deterministic ones."""
     with one_thread():
         return {
             mode: [
@@ -143,8 +107,8 @@ def play(
         }
 
 
-def _play_batch(batch: Batch) -> list[dict[str, list[Episode]]]:
-    """Play `batch` in environments made here in the worker."""
+def _play_batch(batch: SubtaskBatch) -> list[dict[str, list[Episode]]]:
+    """Run `batch` in environments made in this worker."""
     film = batch.config.video
     with worlds(batch.config.environment, filmed=film is not None) as world:
         return [
@@ -154,11 +118,10 @@ def _play_batch(batch: Batch) -> list[dict[str, list[Episode]]]:
 
 
 def score(mode: str, episodes: Sequence[Episode], subtasks: Sequence[str]) -> Scores:
-    """Sum up `episodes` that were played in one mode."""
+    """Score `episodes` that were run in one mode."""
     allowed = [(sum(a.allowed for a in e.actions), len(e.actions)) for e in episodes]
     return Scores(
-        **tally(episodes, subtasks),
-        mode=mode,
+        **tally(mode, episodes, subtasks),
         episodes=tuple(episodes),
         policy_accuracy=grouped_rate([(e.n_correct, len(e.actions)) for e in episodes]),
         lenient_accuracy=grouped_rate(allowed),
@@ -166,6 +129,6 @@ def score(mode: str, episodes: Sequence[Episode], subtasks: Sequence[str]) -> Sc
 
 
 def batches(seeds: Sequence[int]) -> list[tuple[int, ...]]:
-    """Divide `seeds` among workers."""
+    """Divide `seeds` into batches for the workers."""
     size = EPISODES_PER_BATCH
     return [tuple(seeds[first : first + size]) for first in range(0, len(seeds), size)]

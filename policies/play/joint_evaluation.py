@@ -1,7 +1,7 @@
-"""Scores of a joint-level policy: how far it gets, by what physics shows.
+"""Scores of a joint-level policy: how many sub-tasks it completes, judged by the simulation.
 
-Deterministic decisions keep to the typical style, sampled ones to one drawn for each episode. Where
-nothing on the table is moved, deterministic episodes would all be the same one: it is played once.
+Deterministic decisions begin with the nearest demonstration, sampled ones with one drawn for each
+episode. If nothing on the table moves, all deterministic episodes are the same; one is run.
 """
 
 from collections import Counter
@@ -11,20 +11,19 @@ from dataclasses import dataclass
 
 from filtering.vision.determinism import one_thread
 from policies.learners.motion_policy import MotionPolicy
-from policies.play.evaluation import MODES, EvaluationConfig, batches
+from policies.play.environments import make_environment
+from policies.play.evaluation import MODES, batches
 from policies.play.joint_rollout import MotionEpisode, run_motion
 from policies.play.outcomes import Outcomes, tally
-from policies.play.rollout import EnvironmentConfig, make_environment
+from policies.settings import EnvironmentConfig, EvaluationConfig
 from teasim.common import parallel
 from teasim.common.statistics import Rate, grouped_rate
 
 
 @dataclass(frozen=True)
 class MotionScores(Outcomes):
-    """What the episodes of one mode come to; all rates with 95 % intervals."""
+    """Scores of one mode; all rates with 95 % intervals."""
 
-    mode: str
-    """`deterministic` or `sampled` decisions."""
     episodes: tuple[MotionEpisode, ...]
     """The episodes, in the order of their seeds."""
     done: Rate
@@ -34,35 +33,45 @@ class MotionScores(Outcomes):
 
     @property
     def subtasks(self) -> tuple[str, ...]:
-        """All sub-tasks there are."""
+        """All sub-tasks of the environment."""
         return tuple(self.completion)
+
+    @property
+    def mean_done(self) -> float:
+        """Mean number of sub-tasks that took effect in an episode."""
+        return len(self.subtasks) * self.done.value
 
 
 @dataclass(frozen=True)
-class Batch:
-    """Episodes that one worker plays one after the other."""
+class MotionBatch:
+    """Episodes that one worker runs one after the other."""
 
     policy: MotionPolicy
+    """The policy."""
     mode: str
+    """`deterministic` or `sampled` decisions."""
     seeds: tuple[int, ...]
+    """Seeds of the episodes."""
     environment: EnvironmentConfig
+    """Settings of the environment."""
 
 
 def evaluate_motion(
     policy: MotionPolicy, config: EvaluationConfig, *, jobs: int = 1
 ) -> dict[str, MotionScores]:
-    """Try `policy` in both modes; the result does not depend on `jobs`.
+    """Score `policy` in both modes; the result does not depend on `jobs`.
 
     Raises:
         CheckpointError: the policy was trained for another environment.
         ConfigError: the environment cannot be made.
     """
+    environment = config.environment.at_level("joint")
     work = [
-        Batch(policy, mode, seeds, config.environment)
+        MotionBatch(policy, mode, seeds, environment)
         for mode in MODES
         for seeds in batches(_seeds(config, mode))
     ]
-    played = parallel.run(play, work, jobs=jobs, description="episodes")
+    played = parallel.run(_play_batch, work, jobs=jobs, description="episodes")
     pairs = list(zip(work, played, strict=True))
     return {
         mode: score_motion(mode, [e for batch, part in pairs if batch.mode == mode for e in part])
@@ -70,8 +79,8 @@ def evaluate_motion(
     }
 
 
-def play(batch: Batch) -> list[MotionEpisode]:
-    """Play the episodes of `batch` in one environment, made here in the worker."""
+def _play_batch(batch: MotionBatch) -> list[MotionEpisode]:
+    """Run the episodes of `batch` in one environment made in this worker."""
     env = make_environment(batch.environment, batch.policy.spec)
     sure = batch.mode == "deterministic"
     with one_thread(), closing(env):
@@ -79,13 +88,12 @@ def play(batch: Batch) -> list[MotionEpisode]:
 
 
 def score_motion(mode: str, episodes: Sequence[MotionEpisode]) -> MotionScores:
-    """Sum up `episodes`, one or more, that were played in one mode."""
+    """Score `episodes`, one or more, that were run in one mode."""
     names = episodes[0].subtasks
     ends = Counter(episode.last for episode in episodes if not episode.success)
     done = [(len(set(episode.subtasks_done)), len(names)) for episode in episodes]
     return MotionScores(
-        **tally(episodes, names),
-        mode=mode,
+        **tally(mode, episodes, names),
         episodes=tuple(episodes),
         done=grouped_rate(done),
         stopped_after={name: ends[name] for name in ("none", *names) if ends[name]},

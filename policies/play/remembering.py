@@ -1,8 +1,8 @@
-"""An environment that carries out every decision in a scene once, whoever asks for it.
+"""An environment that simulates each sequence of decisions in a scene only once.
 
-Policies that are compared play the same scenes, mostly with the same decisions, and each takes
-seconds of physics. The world is deterministic: what a list of decisions leads to in a scene may be
-kept. Where a policy does something new the environment goes back to the state before it.
+Policies that are compared act in the same scenes, mostly with the same decisions, and each decision
+takes seconds of simulation. The environment is deterministic, so the result of a sequence of
+decisions in a scene is cached. For a new decision the environment is reset to the state before it.
 """
 
 from collections import OrderedDict
@@ -12,9 +12,10 @@ from typing import Any
 import gymnasium as gym
 
 SCENES = 64
-"""Scenes that are kept; the one not played for longest is forgotten."""
+"""Scenes in the cache; the least recently used one is dropped."""
 
 Decisions = tuple[int, ...]
+"""Actions since the reset."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +23,13 @@ class Moment:
     """A scene after some decisions."""
 
     seen: tuple[Any, float, bool, bool, dict[str, Any]]
-    """What `step` returned."""
+    """Result of `step`."""
     state: Any
-    """What `set_state` takes to go back here."""
+    """Argument of `set_state` that returns the environment here."""
 
 
 class Remembering(gym.Wrapper[Any, int, Any, int]):
-    """Answers from memory where it can; the answers are those of `env`, bit for bit."""
+    """Returns cached results where possible; they equal those of `env` bit for bit."""
 
     def __init__(self, env: gym.Env[Any, int]) -> None:
         """Wrap an environment that `can_remember`."""
@@ -37,7 +38,7 @@ class Remembering(gym.Wrapper[Any, int, Any, int]):
         self._seed = 0
         self._decisions: Decisions = ()
         self._present: Moment | None = None
-        """Where `env` is."""
+        """The moment `env` is in."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -45,10 +46,10 @@ class Remembering(gym.Wrapper[Any, int, Any, int]):
         """Start the scene `seed`, without options.
 
         Raises:
-            ValueError: no seed, or options: that scene could not be told from others.
+            ValueError: there is no seed, or there are options; scenes are identified by the seed.
         """
         if seed is None or options:
-            raise ValueError("Scenes are remembered by their seed alone; give one and no options.")
+            raise ValueError("Scenes are identified by the seed; give one, and no options.")
         self._seed, self._decisions = seed, ()
         if seed not in self._scenes:
             observation, info = self.env.reset(seed=seed)
@@ -61,7 +62,7 @@ class Remembering(gym.Wrapper[Any, int, Any, int]):
         return seen[0], seen[4]
 
     def step(self, action: int) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Carry out `action`, or remember what it led to."""
+        """Return the cached result of `action`, or simulate it."""
         before = self._here
         self._decisions = (*self._decisions, int(action))
         if self._decisions not in self._scenes[self._seed]:
@@ -71,7 +72,7 @@ class Remembering(gym.Wrapper[Any, int, Any, int]):
         return self._here.seen
 
     def render(self) -> Any:
-        """Picture of the scene as it is now."""
+        """Picture of the scene in its present state."""
         self._go_to(self._here)
         return self.env.render()
 
@@ -92,6 +93,6 @@ class Remembering(gym.Wrapper[Any, int, Any, int]):
 
 
 def can_remember(env: gym.Env[Any, int]) -> bool:
-    """Whether `env` can go back to a state, and no wrapper counts the steps beside it."""
+    """Whether `env` can restore a state, and no wrapper around it counts steps."""
     able = hasattr(env.unwrapped, "get_state") and hasattr(env.unwrapped, "set_state")
     return able and (env.spec is None or env.spec.max_episode_steps is None)

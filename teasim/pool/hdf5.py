@@ -14,6 +14,7 @@ from teasim.common.errors import PoolError
 from teasim.pool.clips import ArrayClip, ImageClip
 from teasim.pool.clips.hdf5 import opened
 from teasim.pool.clips.order import MAX_SIDE
+from teasim.pool.recordings import listed
 
 SUFFIXES = (".hdf5", ".h5")
 MOST_COMPRESSED = 2000
@@ -36,8 +37,8 @@ def root_names(path: Path) -> frozenset[str]:
 
 def files_in(path: Path) -> list[Path]:
     """Return the HDF5 files of a folder, or the file itself if it is one."""
-    found = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [f for f in found if f.suffix in SUFFIXES and f.name[0] != "." and f.is_file()]
+    found = listed(path) if path.is_dir() else [path]
+    return [file for file in found if file.suffix in SUFFIXES and file.is_file()]
 
 
 def group(parent: Any, name: str) -> Any:
@@ -77,7 +78,9 @@ def clips_in(path: Path, parent: Any) -> dict[str, ArrayClip | ImageClip]:
 
 
 def logs_hash(path: Path, logs: Mapping[str, Any]) -> str:
-    """Return a hash of arrays of numbers by name; others are passed over.
+    """Return a hash of the arrays of numbers with one or two axes, by name.
+
+    Others, depth pictures for instance, are passed over.
 
     Raises:
         PoolError: an array claims more than the file holds.
@@ -85,7 +88,8 @@ def logs_hash(path: Path, logs: Mapping[str, Any]) -> str:
     content = hashlib.sha256()
     for name in sorted(logs):
         data = logs[name]
-        if data.dtype.kind in "fiub" and data.shape is not None and _kind(data) is None:
+        numbers = data.dtype.kind in "fiub" and len(data.shape or ()) in (1, 2)
+        if numbers and _kind(data) is None:
             values = np.ascontiguousarray(checked(path, data)[()], dtype="<f4")
             content.update(f"{name} {values.shape}\n".encode())
             content.update(values.tobytes())

@@ -61,6 +61,7 @@ def _check_pictures(pool: Pool, episodes: Sequence[Episode]) -> Iterator[Problem
                 found = told[clip.path] = list(sentences(partial(_check_file, clip.path)))
             else:
                 found = told.get(clip.path, [])
+            found = found or list(sentences(partial(_check_ends, clip)))
             yield from (Problem(text, episode.index) for text in found)
 
 
@@ -68,6 +69,12 @@ def _check_file(path: Path) -> Iterator[str]:
     decoded, stored = check_decodable(path), probe(path).n_frames
     if decoded < stored:
         yield f"The video '{path}' is damaged: {decoded} of its {stored} frames can be decoded."
+
+
+def _check_ends(clip: Clip) -> Iterator[str]:
+    """Are the first and the last frame found at their times?"""
+    clip.frames([0, clip.length - 1])
+    yield from ()
 
 
 def _check_images(clip: Clip) -> Iterator[str]:

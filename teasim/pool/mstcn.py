@@ -178,9 +178,9 @@ class MSTCNFolder:
                 uneven.append(video)
         if uneven:
             told.append(
-                f"Labels and features of {len(uneven)} videos of '{self.root}' differ by a few "
-                f"frames, and the longer is cut: {', '.join(uneven[:3])}"
-                f"{', ...' * (len(uneven) > 3)}."
+                f"In {len(uneven)} of {len(self.videos)} videos of '{self.root}' labels and "
+                "features differ by a few frames, and the longer is cut: "
+                f"{', '.join(uneven[:3])}{', ...' * (len(uneven) > 3)}."
             )
         return tuple(told)
 

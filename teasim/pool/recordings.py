@@ -173,3 +173,11 @@ def unreadable(open_it: Callable[[], RecordedSource]) -> list[str]:
             except PoolError as error:
                 found.append(str(error))
     return found
+
+
+def listed(folder: Path) -> list[Path]:
+    """Return what is in a folder, without hidden files; nothing if it must not be looked into."""
+    try:
+        return sorted(path for path in folder.iterdir() if path.name[0] != ".")
+    except OSError:
+        return []

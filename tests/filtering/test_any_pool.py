@@ -5,13 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from filtering.judging.config import JudgingConfig
+from filtering.judging.evidence import Evidence
+from filtering.judging.judges import JUDGES
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import StepList, count_steps
 from filtering.judging.thresholds import probability_incorrect
-from filtering.judging.verdict import JUDGES, Evidence, Rule
 from teasim.pool import Span
 
-RULE = Rule("auto", "auto", "annealed", 0.5, 0.01, (), 0.0)
+RULE = JudgingConfig()
 ORDERS = st.lists(st.lists(st.integers(0, 5), min_size=1, max_size=8), min_size=3, max_size=8)
 """Repeated sub-tasks, demonstrations of one segment, sub-tasks that nobody does."""
 
@@ -29,30 +31,30 @@ def evidence(orders: list[list[int]], n_subtasks: int = 6) -> Evidence:
 @given(orders=ORDERS, seed=st.integers(0, 9))
 @settings(max_examples=3, deadline=None)
 def test_every_score_judges_every_pool(name: str, orders: list[list[int]], seed: int) -> None:
-    verdict = JUDGES[name](evidence(orders), RULE)
-    for values in (verdict.losses, verdict.weights, verdict.trust):
+    judgement = JUDGES[name](evidence(orders), RULE)
+    for values in (judgement.losses, judgement.weights, judgement.trust):
         assert values.shape == (len(orders),)
         assert np.isfinite(values).all()
-    assert ((verdict.weights >= 0) & (verdict.weights <= 1)).all()
-    assert np.isfinite(probability_incorrect(verdict.losses)).all()
-    flagged = verdict.grouping.flagged
-    assert (verdict.weights[flagged] < verdict.grouping.threshold + 1e-12).all()
+    assert ((judgement.weights >= 0) & (judgement.weights <= 1)).all()
+    assert np.isfinite(probability_incorrect(judgement.losses)).all()
+    flagged = judgement.grouping.flagged
+    assert (judgement.weights[flagged] < judgement.grouping.threshold + 1e-12).all()
     for demo in np.flatnonzero(flagged):
-        assert all(np.isfinite(item.surprise) for item in verdict.findings[demo])
+        assert all(np.isfinite(item.surprise) for item in judgement.findings[demo])
     order = np.random.default_rng(seed).permutation(len(orders))
     permuted = JUDGES[name](evidence([orders[k] for k in order]), RULE)
-    assert permuted.losses == pytest.approx(verdict.losses[order], abs=1e-4)
+    assert permuted.losses == pytest.approx(judgement.losses[order], abs=1e-4)
 
 
 @pytest.mark.parametrize("name", JUDGES)
 @pytest.mark.parametrize("n_subtasks", [1, 2, 30])
 def test_other_numbers_of_sub_tasks(name: str, n_subtasks: int) -> None:
     full = list(range(n_subtasks))
-    verdict = JUDGES[name](evidence([full] * 5, n_subtasks), RULE)
-    assert not verdict.grouping.flagged.any()
+    judgement = JUDGES[name](evidence([full] * 5, n_subtasks), RULE)
+    assert not judgement.grouping.flagged.any()
     if n_subtasks > 1:
-        verdict = JUDGES[name](evidence([full] * 6 + [full[:-1]], n_subtasks), RULE)
-        assert np.flatnonzero(verdict.grouping.flagged).tolist() == [6]
+        judgement = JUDGES[name](evidence([full] * 6 + [full[:-1]], n_subtasks), RULE)
+        assert np.flatnonzero(judgement.grouping.flagged).tolist() == [6]
 
 
 @pytest.mark.parametrize("name", JUDGES)

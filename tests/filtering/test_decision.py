@@ -5,26 +5,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.judging.clusters import SMALLEST_CUT, cut_of, decide
+from filtering.judging.norm.cut import SMALLEST_CUT, cut_of, decide
 
 losses_of = st.lists(st.floats(0, 30), min_size=3, max_size=12)
 
 
 def flagged(losses, groups="auto", left_out=None):
     natures = np.zeros(len(losses), dtype=bool) if left_out is None else np.array(left_out)
-    return decide(np.array(losses, dtype=float), natures, groups).grouping.flagged.tolist()
+    return decide(np.array(losses, dtype=float), natures, groups)[1].flagged.tolist()
 
 
 @given(losses=losses_of, groups=st.sampled_from(["auto", "1", "2", "3"]), seed=st.integers(0, 99))
 @settings(deadline=None)
 def test_groups_are_numbered_without_gaps_and_the_threshold_separates(losses, groups, seed):
     natures = np.random.default_rng(seed).random(len(losses)) < 0.5
-    found = decide(np.array(losses), natures, groups)
-    grouping = found.grouping
+    weights, grouping = decide(np.array(losses), natures, groups)
     assert set(grouping.groups) == set(range(grouping.count))
     assert grouping.count <= (3 if groups == "auto" else int(groups))
-    assert (found.weights[grouping.flagged] <= grouping.threshold).all()
-    assert (found.weights[~grouping.flagged] >= grouping.threshold).all()
+    assert (weights[grouping.flagged] <= grouping.threshold).all()
+    assert (weights[~grouping.flagged] >= grouping.threshold).all()
     kept, out = (np.array(losses)[mask] for mask in (~grouping.flagged, grouping.flagged))
     assert len(kept)
     assert not len(out) or kept.max() < out.min()
@@ -53,7 +52,7 @@ def test_where_the_usual_ones_vary_a_small_loss_is_variety():
 @pytest.mark.parametrize("groups", ["auto", "3"])
 def test_what_is_out_of_order_comes_before_what_is_left_out(groups):
     losses = [0.0] * 6 + [2.7] * 4 + [3.1, 6.0]
-    found = decide(np.array(losses), np.arange(12) >= 10, groups).grouping
+    found = decide(np.array(losses), np.arange(12) >= 10, groups)[1]
     assert found.groups.tolist() == [0] * 6 + [1] * 4 + [2] * 2
     assert found.names == ("kept", "out of order", "steps left out")
 
@@ -61,11 +60,11 @@ def test_what_is_out_of_order_comes_before_what_is_left_out(groups):
 def test_mistakes_of_one_nature_are_one_group_unless_three_are_told():
     losses = np.array([0.0] * 6 + [3.0, 3.1, 9.0, 9.1])
     left_out = np.ones(10, dtype=bool)
-    assert decide(losses, left_out, "auto").grouping.groups.tolist() == [0] * 6 + [1] * 4
-    told = decide(losses, left_out, "3").grouping.groups
+    assert decide(losses, left_out, "auto")[1].groups.tolist() == [0] * 6 + [1] * 4
+    told = decide(losses, left_out, "3")[1].groups
     assert told.tolist() == [0] * 6 + [1] * 2 + [2] * 2
-    assert decide(losses, left_out, "auto").grouping.names == ("kept", "steps left out")
-    assert decide(losses, left_out, "3").grouping.names == ()
+    assert decide(losses, left_out, "auto")[1].names == ("kept", "steps left out")
+    assert decide(losses, left_out, "3")[1].names == ()
 
 
 def test_told_one_group_flags_nothing_and_told_two_finds_two():

@@ -1,3 +1,4 @@
+import doctest
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -5,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import filtering.demo_filter
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from filtering.judging.verdict import JUDGES
+from filtering.judging.judges import JUDGES
 from filtering.segmentation.segmenter import segmenter_named
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool
@@ -96,6 +98,11 @@ def test_unknown_camera_is_refused_with_the_choices(toy_pool: Pool) -> None:
     with pytest.raises(ConfigError) as caught:
         DemoFilter(FilterConfig(cameras=("roof",))).fit(toy_pool)
     assert str(caught.value) == "The pool has no camera 'roof'; choose from left, cup."
+
+
+def test_the_example_of_the_filter_runs() -> None:
+    assert doctest.testmod(filtering.demo_filter).failed == 0
+    assert "DemoFilter(" in (DemoFilter.__doc__ or "")
 
 
 def test_too_small_pools_are_refused(tmp_path: Path) -> None:

@@ -1,30 +1,18 @@
-"""Effects are read whatever the order was; only a missing one costs."""
+"""A segment that changes less than usual is noticed; usual segments cost nothing."""
 
-import json
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from filtering.effects.checkpoint import load_effects, save_effects
-from filtering.effects.reader import (
-    Effect,
-    EffectReader,
-    effect_states,
-    find_effects,
-    fit_effects,
-)
 from filtering.effects.rests import changes, look_at_rests, rest_features, rest_moments
 from filtering.effects.surprise import effect_surprises
 from filtering.vision.frame_features import FrameSource, frame_features
-from teasim.common.errors import CheckpointError, ConfigError
 from teasim.pool import Pool, Span
-from tests.toy_pool import SEQ_1, SEQ_2
+from tests.toy_pool import SEQ_1
 
-SOURCE = FrameSource(("left", "cup"))
 FEATURES = 40
 INVISIBLE = "stir"
-OVEN = Effect("turn_on_oven", "turn_off_oven")
 TRACES = {
     name: np.random.default_rng(number).normal(size=FEATURES) * (name != INVISIBLE)
     for number, name in enumerate(SEQ_1)
@@ -40,87 +28,8 @@ def toy_rests(
     return rng.normal(size=FEATURES) * 3 + shown + rng.normal(scale=0.15, size=shown.shape)
 
 
-def shuffled(rng: np.random.Generator) -> tuple[str, ...]:
-    middle = rng.permutation(SEQ_1[1:4]).tolist()
-    return (SEQ_1[0], *middle, *SEQ_1[4:]) if rng.random() < 0.5 else (*SEQ_2,)
-
-
-@pytest.fixture(scope="module")
-def labelled() -> tuple[list[np.ndarray], list[tuple[str, ...]]]:
-    rng = np.random.default_rng(1)
-    names = [shuffled(rng) for _ in range(8)]
-    return [toy_rests(done, rng) for done in names], names
-
-
-@pytest.fixture(scope="module")
-def reader(labelled) -> EffectReader:
-    return fit_effects(*labelled, SOURCE)
-
-
-def test_what_is_undone_is_one_effect(labelled, reader):
-    assert OVEN in reader.effects
-    alone = {effect.subtask for effect in reader.effects if effect.undone_by is None}
-    assert alone == set(SEQ_1) - {"turn_on_oven", "turn_off_oven"}
-    assert find_effects(*labelled) == find_effects(labelled[0][::-1], labelled[1][::-1])
-
-
-def test_states_follow_the_steps():
-    effects = (OVEN, Effect("add_milk", None))
-    done = ("add_milk", "turn_on_oven", "add_sugar", "turn_off_oven", "turn_on_oven")
-    expected = [[0, 0], [0, 1], [1, 1], [1, 1], [0, 1], [1, 1]]
-    np.testing.assert_array_equal(effect_states(effects, done), expected)
-
-
-def test_effects_are_read_in_orders_never_shown(reader):
-    done = ("add_water", "add_tea_bag", "turn_on_oven", "add_milk", "turn_off_oven", "add_sugar")
-    said = reader.read(toy_rests(done, np.random.default_rng(9)))
-    visible = [n for n, effect in enumerate(reader.effects) if effect.subtask != INVISIBLE]
-    truth = effect_states(reader.effects, done)[1:]
-    np.testing.assert_array_equal((said > 0.5)[:, visible], truth[:, visible] > 0.5)
-    assert said.min() >= 0
-    assert said.max() <= 1
-
-
-def test_what_cannot_be_seen_is_not_claimed(reader):
-    errors = {e.subtask: error for e, error in zip(reader.effects, reader.errors, strict=True)}
-    unseen = errors.pop(INVISIBLE)
-    assert unseen > 2 * max(errors.values())
-    reliability = reader.reliability()
-    assert reliability.pop(INVISIBLE) < min(reliability.values()) > 0.95
-
-
-@pytest.mark.parametrize("step", [n for n, name in enumerate(SEQ_1) if name != INVISIBLE])
-def test_the_reader_notices_what_came_of_nothing(reader, step):
-    surprises = reader.surprises(toy_rests(SEQ_1, np.random.default_rng(5), [step]), SEQ_1)
-    usual = reader.surprises(toy_rests(SEQ_1, np.random.default_rng(5)), SEQ_1)
-    assert surprises[step] > 3
-    visible = [n for n, name in enumerate(SEQ_1) if name != INVISIBLE]
-    assert usual[visible].max() < 0.1
-
-
-def test_learning_does_not_depend_on_the_order_of_demonstrations(labelled, reader):
-    rests, names = labelled
-    other = fit_effects(rests[::-1], names[::-1], SOURCE)
-    np.testing.assert_allclose(other.weights, reader.weights, atol=1e-5)
-    again = fit_effects(rests, names, SOURCE)
-    np.testing.assert_array_equal(again.weights, reader.weights)
-
-
-def test_too_few_demonstrations_are_refused(labelled, reader):
-    with pytest.raises(ConfigError) as caught:
-        fit_effects(labelled[0][:2], labelled[1][:2], SOURCE)
-    assert str(caught.value) == (
-        "Effects are learned from 3 labelled demonstrations or more, not 2."
-    )
-    with pytest.raises(ConfigError) as caught:
-        reader.read(np.zeros((3, 7)))
-    assert str(caught.value) == (
-        "The video has 7 features per rest; the effects were learned from 40."
-    )
-
-
 def toy_changes(demos: int, bad: int, seed: int, step: int) -> list[np.ndarray]:
-    """Changes of `demos` demonstrations; in the last `bad` ones, nothing comes of a step."""
+    """Changes of `demos` demonstrations; in the last `bad` ones a step is ineffective."""
     rng = np.random.default_rng(seed)
     return [
         changes(toy_rests(SEQ_1, rng, [step] if demo >= demos - bad else []))
@@ -147,7 +56,7 @@ def test_usual_segments_and_invisible_effects_cost_nothing(demos):
     assert worst(toy_changes(demos, 1, 4, SEQ_1.index(INVISIBLE))).max() < 1
 
 
-def test_surprises_follow_the_demonstrations(labelled):
+def test_surprises_follow_the_demonstrations():
     pool = toy_changes(6, 1, 8, 2)
     labels = [list(range(len(SEQ_1)))] * 6
     usual = effect_surprises(pool, labels)
@@ -191,50 +100,3 @@ def test_looking_at_rests_alone_sees_the_same(toy_pool: Pool):
         full = rest_features(features, episode.length, episode.spans(), toy_pool.fps)
         np.testing.assert_allclose(rests, full, atol=1e-4)
         assert len(rests) == len(episode.spans()) + 1
-
-
-def test_a_saved_reader_says_the_same(reader, tmp_path):
-    save_effects(reader, tmp_path)
-    loaded = load_effects(tmp_path)
-    rests = toy_rests(SEQ_1, np.random.default_rng(2))
-    np.testing.assert_array_equal(loaded.read(rests), reader.read(rests))
-    assert loaded.effects == reader.effects
-    assert loaded.source == reader.source
-    assert loaded.reliability() == reader.reliability()
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"effects": [{"subtask": "pour"}]},
-        {"effects": []},
-        {"effects": None},
-        {"errors": [0.1]},
-        {"certainties": "many"},
-        {"source": {"cameras": [], "rate": 5.0}},
-        {"source": None},
-    ],
-)
-def test_a_description_of_other_weights_is_refused(reader, tmp_path, fields):
-    save_effects(reader, tmp_path)
-    path = tmp_path / "effects.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | fields))
-    with pytest.raises(CheckpointError) as caught:
-        load_effects(tmp_path)
-    assert str(caught.value) == f"'{path}' does not describe the weights beside it; fit again."
-
-
-def test_no_reader_and_other_features_are_refused(reader, tmp_path):
-    with pytest.raises(CheckpointError) as caught:
-        load_effects(tmp_path)
-    assert str(caught.value) == (
-        f"'{tmp_path}' holds no effect reader: effects.json cannot be read."
-    )
-    save_effects(reader, tmp_path)
-    path = tmp_path / "effects.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"features": ["vgg16", "0"]}))
-    with pytest.raises(CheckpointError) as caught:
-        load_effects(tmp_path)
-    assert str(caught.value) == (
-        f"'{path}' was fitted to other features of a frame than this program computes; fit again."
-    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from filtering.features.erasure import erasure_importance, max_over_time, rank_channels
-from filtering.features.intervals import Intervals
+from filtering.features.graphs.intervals import Intervals
 
 CHANNELS = 4
 VALUES = np.array([[3.0, 1.0, 0.0, 2.0], [0.0, 4.0, 0.0, 2.0], [5.0, 1.0, 1.0, 0.5]])

@@ -5,13 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.judging.clusters import SMALLEST_CUT
 from filtering.judging.equation3.score import Score
 from filtering.judging.equation3.sequence import transitions
+from filtering.judging.equation3.surprises import find_surprises
+from filtering.judging.evidence import Evidence
 from filtering.judging.explain import Finding
-from filtering.judging.findings import Places, find_departures, find_surprises, usual_order
+from filtering.judging.norm.cut import SMALLEST_CUT
+from filtering.judging.norm.departures import find_departures
 from filtering.judging.norm.norm_score import score_steps
-from filtering.judging.verdict import Evidence
+from filtering.judging.places import Places, usual_order
 from teasim.pool import Span
 
 NAMES = ("a", "b", "c", "d")

@@ -10,10 +10,10 @@ from scipy.stats import binomtest
 from torch_geometric.data import Data
 
 from filtering.features.config import LAYERS, ClassifierConfig
-from filtering.features.graph import interval_graph
-from filtering.features.intervals import Intervals, find_intervals, mean_thresholds
-from filtering.features.relations import Relation
-from filtering.features.rgcn import LAYER_KINDS, GraphClassifier
+from filtering.features.graphs.graph import interval_graph
+from filtering.features.graphs.intervals import Intervals, find_intervals, mean_thresholds
+from filtering.features.graphs.relations import Relation
+from filtering.features.graphs.rgcn import LAYER_KINDS, GraphClassifier
 from teasim.common.errors import ConfigError
 from tests.filtering.toy_intervals import (
     CHANNELS,
@@ -122,7 +122,7 @@ def test_edges_without_types_say_less() -> None:
 
 
 @pytest.mark.parametrize("layers", LAYERS)
-def test_both_kinds_of_layers_learn_which_intervals_there_are(layers: str) -> None:
+def test_both_distinct_demos_layers_learn_which_intervals_there_are(layers: str) -> None:
     """The bag fails above because of what it sees, not because it cannot learn."""
     toy = toy_clips(120, seed=0)
     thresholds = mean_thresholds(toy.activations)

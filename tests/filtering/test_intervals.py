@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtering.features.intervals import Intervals, find_intervals, mean_thresholds
+from filtering.features.graphs.intervals import Intervals, find_intervals, mean_thresholds
 
 Run = tuple[int, int]
 

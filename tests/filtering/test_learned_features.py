@@ -8,7 +8,6 @@ import pytest
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from filtering.effects.checkpoint import load_effects
 from filtering.features.bottleneck import Bottleneck
 from filtering.features.checkpoint import load_features
 from filtering.features.config import (
@@ -17,13 +16,11 @@ from filtering.features.config import (
     GeneratorConfig,
     TrainingConfig,
 )
-from filtering.features.description import POOLED, describe_segments
-from filtering.features.extraction import segment_features
+from filtering.features.extraction import frame_maps, segment_maps
 from filtering.features.learned import LookConfig, learn_features
-from filtering.features.maps import frame_maps, segment_maps
 from filtering.features.pictures import overlay
-from filtering.segmentation.fitting import FitConfig, fit_segmenter
-from filtering.segmentation.mstcn_training import MSTCNConfig
+from filtering.segmentation.config import FitConfig, MSTCNConfig
+from filtering.segmentation.fit import fit_segmenter
 from teasim.common.errors import CheckpointError, ConfigError
 from teasim.pool import Pool
 from tests.toy_pool import make_toy_pool
@@ -39,7 +36,7 @@ QUICK = MSTCNConfig(
 
 @pytest.fixture(scope="module")
 def folder(toy_pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A segmenter's folder with features and effects."""
+    """The folder of a segmenter with features."""
     out = tmp_path_factory.mktemp("learned") / "segmenter"
     config = FitConfig(episodes=(0, 1, 3), cameras=("cup",), features=True, network=QUICK)
     fit_segmenter(toy_pool.root, out, config)
@@ -47,13 +44,12 @@ def folder(toy_pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_folder_of_a_segmenter_holds_all_that_was_learned(folder):
-    stems = {"segmenter", "effects", "bottleneck", "generator"}
+    stems = {"segmenter", "bottleneck", "generator"}
     assert {path.name for path in folder.iterdir()} == {
         f"{stem}.{suffix}" for stem in stems for suffix in ("json", "safetensors")
     }
     record = json.loads((folder / "segmenter.json").read_text())["record"]
     assert record["config"]["features"] is True
-    assert record["effects"] == load_effects(folder).reliability()
 
 
 def test_a_segment_becomes_the_maximum_of_the_kept_channels(folder, toy_pool):
@@ -95,14 +91,6 @@ def test_the_filter_uses_learned_features(folder, toy_pool):
     # Equation 3 sees the segments through these features alone.
     pooled = DemoFilter(FilterConfig(score="equation3", groups="2")).fit(toy_pool)
     assert not np.array_equal(filtered.losses_, pooled.losses_)
-
-
-def test_pooled_features_are_those_of_frames(toy_pool):
-    segments = [episode.spans() for episode in toy_pool.episodes]
-    look = {"cameras": ("cup",), "frames_per_segment": 2, "background": "none", "jobs": 1}
-    one = describe_segments(POOLED, toy_pool, segments, **look)
-    other = segment_features(toy_pool, segments, **look)
-    np.testing.assert_array_equal(np.vstack(one), np.vstack(other))
 
 
 def test_features_that_are_not_there_are_refused_with_the_choices(folder, toy_pool, tmp_path):

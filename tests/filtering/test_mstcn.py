@@ -7,14 +7,14 @@ import pytest
 import torch
 from torch.nn import functional
 
-from filtering.segmentation.mstcn import (
+from filtering.segmentation.mstcn.network import (
     MSTCN,
     DilatedResidualLayer,
     DualDilatedLayer,
     MSTCNShape,
     mstcn_loss,
 )
-from filtering.segmentation.mstcn_training import (
+from filtering.segmentation.mstcn.training import (
     LabelledVideo,
     MSTCNConfig,
     MSTCNLearner,
@@ -217,7 +217,7 @@ def video(frames: int = 4, width: int = 2, label: int = 0) -> LabelledVideo:
             lambda: MSTCNConfig(learning_rate=0.0),
             "learning_rate is 0.0; choose a number above 0.",
         ),
-        (lambda: MSTCNConfig(left_out=1.5), "left_out is 1.5; choose a chance from 0 to 1."),
+        (lambda: MSTCNConfig(left_out=1.5), "left_out is 1.5; choose a probability from 0 to 1."),
         (
             lambda: MSTCNConfig(scaling="none"),
             "Unknown scaling 'none'; choose video, training.",

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from filtering.segmentation.mstcn import MSTCN, MSTCNShape
-from filtering.segmentation.mstcn_checkpoint import load_segmenter, save_segmenter
-from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
+from filtering.segmentation.mstcn.checkpoint import load_segmenter, save_segmenter
+from filtering.segmentation.mstcn.network import MSTCN, MSTCNShape
+from filtering.segmentation.mstcn.segmenter import MSTCNSegmenter
 from filtering.vision.frame_features import FrameSource
 from teasim.common.errors import CheckpointError, ConfigError
 

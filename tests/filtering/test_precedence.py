@@ -8,7 +8,7 @@ import pytest
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from filtering.judging.clusters import cut_of
+from filtering.judging.norm.cut import cut_of
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.precedence import precedence_graph, read_precedence
 from filtering.judging.norm.steps import StepList, count_steps
@@ -87,7 +87,7 @@ def test_lines_and_json_say_the_same(text: str, tmp_path: Path) -> None:
         ("a before b\na then b", "Line 2 of '{path}' is 'a then b'; write 'a before b'."),
         ('[["a"]]', '\'{path}\' has the entry ["a"]; write ["a", "b"].'),
         ('[["a", 3]]', '\'{path}\' has the entry ["a", 3]; write ["a", "b"].'),
-        ("[1,", "'{path}' is no JSON: Expecting value: line 1 column 4 (char 3)."),
+        ("[1,", "'{path}' is not valid JSON: Expecting value: line 1 column 4 (char 3)."),
     ],
 )
 def test_files_that_say_something_else_are_refused(text: str, message: str, tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"cannot be read: No such file"):
         read_precedence(tmp_path / "none")
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigError, match=r"is no text\.$"):
+    with pytest.raises(ConfigError, match=r"is not a text file\.$"):
         read_precedence(tmp_path / "bytes")
 
 
@@ -111,11 +111,11 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:
     [
         (
             (("a", "tea"),),
-            "The precedence names 'tea', which is none of the pool's sub-tasks a, b, c.",
+            "The precedence names the unknown sub-task 'tea'; the pool has a, b, c.",
         ),
         (
             (("b", "c"), ("c", "b")),
-            "The precedence runs in a circle: 'b' would come before itself.",
+            "The precedence has a cycle: 'b' would have to come before itself.",
         ),
     ],
 )
@@ -135,7 +135,8 @@ def test_impossible_graphs_are_refused(pairs, message: str) -> None:
         ),
         (
             {"threshold": "luck"},
-            "Unknown threshold 'luck'; choose auto, kmeans, gmm, minibatch.",
+            "Unknown threshold 'luck'; choose a number between 0 and 1, auto, kmeans, gmm, "
+            "minibatch.",
         ),
     ],
 )

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from filtering.features.relations import NO_RELATION, Relation, relation_matrix
+from filtering.features.graphs.relations import NO_RELATION, Relation, relation_matrix
 
 # Few places, so that starts and stops often coincide.
 intervals = st.lists(st.tuples(st.integers(0, 8), st.integers(1, 8)), min_size=1, max_size=8).map(

@@ -10,9 +10,10 @@ from filtering.cli import main as filter_verb
 from filtering.cli import segment
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from filtering.segmentation.fitting import FitConfig, FitResult, fit_segmenter, predict
-from filtering.segmentation.mstcn_checkpoint import load_segmenter
-from filtering.segmentation.mstcn_training import MSTCNConfig
+from filtering.segmentation.config import FitConfig, MSTCNConfig
+from filtering.segmentation.fit import FitResult, fit_segmenter
+from filtering.segmentation.mstcn.checkpoint import load_segmenter
+from filtering.segmentation.predict import predict
 from filtering.segmentation.scoring import folder_pair, score_episodes
 from filtering.vision.frame_features import FrameSource, frame_features
 from teasim.common.errors import ConfigError, PoolError, TeasimError
@@ -174,7 +175,7 @@ def test_by_chance_as_many_as_asked_for_are_labelled(toy_pool: Pool, tmp_path):
         (["--episodes", "0", "9"], "The pool has no demonstration 9; choose from 0 to 6."),
         (
             ["--episodes", "0", "--labelled", "2"],
-            "Both episodes and a number of labelled ones were given; choose one.",
+            "Both episodes and labelled were given; choose one.",
         ),
         (["--labelled", "8"], "labelled is 8; choose 1 to 7."),
         (["--labelled", "0"], "labelled is 0; choose 1 to 7."),
@@ -196,8 +197,8 @@ def test_a_pool_without_labels_teaches_nothing(toy_pool, tmp_path, monkeypatch):
     with pytest.raises(PoolError) as caught:
         fit_segmenter(toy_pool.root, tmp_path / "s", replace(FIT, episodes=()))
     assert str(caught.value) == (
-        f"The pool '{toy_pool.root}' has no labelled sub-tasks (column subtask_index), which a "
-        "segmenter learns from."
+        f"The pool '{toy_pool.root}' has no labelled sub-tasks, which a segmenter is fitted to; "
+        "filter it with --segmenter clustering instead."
     )
 
 
@@ -211,7 +212,7 @@ def test_labels_are_drawn_from_demonstrations_that_have_some(toy_pool, tmp_path,
     with pytest.raises(PoolError) as caught:
         fit_segmenter(toy_pool.root, tmp_path / "t", QUICK)
     assert str(caught.value) == (
-        "Demonstration 0 has no labelled sub-tasks, which a segmenter learns from; choose others."
+        "Demonstration 0 has no labelled sub-tasks, which a segmenter is fitted to; choose others."
     )
 
 
@@ -231,7 +232,7 @@ def test_predicting_without_known_truth_scores_nothing(
     monkeypatch.setattr(Episode, "spans", lambda _: ())
     argv = ["predict", str(fitted[0]), str(toy_pool.root), "-o", str(tmp_path / "o"), "--jobs", "1"]
     assert segment(argv) == 0
-    assert "The truth is not known, so nothing is scored." in capsys.readouterr().out
+    assert "Nothing is scored: the true labels are not known." in capsys.readouterr().out
     assert not (tmp_path / "o" / "metrics.json").exists()
     assert not (tmp_path / "o" / "groundTruth").exists()
 

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from filtering.cli import main
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
+from filtering.judging.judges import JUDGES
 from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import count_steps, steps_of_frames
-from filtering.judging.verdict import JUDGES
 from filtering.output import FILES
 from filtering.segmentation.segmenter import segmenter_named
+from teasim.cli.main import main
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool, Span
 from teasim.pool.mstcn import write_predictions
@@ -44,7 +44,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def run(folder: Path, out: Path, *extra: str) -> int:
-    return main([str(folder), "-o", str(out), *extra])
+    return main(["filter", str(folder), "-o", str(out), *extra])
 
 
 @pytest.mark.parametrize(("count", "majority"), [(3, 2), (4, 3), (5, None)])
@@ -63,7 +63,7 @@ def test_a_few_demonstrations_come_with_a_caution(
         return
     assert told == (
         f"With {count} demonstrations a majority is {majority}: a mistake that 2 of them share "
-        "cannot be told from what is usual, and even that of a single one may not be flagged."
+        "looks like usual behaviour, and even the mistake of a single one may not be flagged."
     )
     assert told in printed
 
@@ -125,15 +125,15 @@ def test_every_score_judges_step_lists(folder: Path, name: str) -> None:
     [
         (
             ["--camera", "left"],
-            "'{folder}' has no pictures, which cameras is about; leave it out.",
+            "'{folder}' has no pictures; leave out cameras, which needs them.",
         ),
         (
             ["--background", "mog2"],
-            "'{folder}' has no pictures, which background is about; leave it out.",
+            "'{folder}' has no pictures; leave out background, which needs them.",
         ),
         (
             ["--frames-per-segment", "8"],
-            "'{folder}' has no pictures, which frames_per_segment is about; leave it out.",
+            "'{folder}' has no pictures; leave out frames_per_segment, which needs them.",
         ),
         (["--fps", "0"], "fps is 0.0; choose a number above 0."),
     ],

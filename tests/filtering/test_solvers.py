@@ -11,15 +11,16 @@ from scipy.optimize import approx_fprime
 
 from filtering.features.reduction import reduce_features
 from filtering.judging.equation3.alternating import Alternating
-from filtering.judging.equation3.annealed import Annealed, trust
+from filtering.judging.equation3.annealed import Annealed
 from filtering.judging.equation3.exact import MOST, Exact
 from filtering.judging.equation3.problem import Problem
 from filtering.judging.equation3.published import Published
 from filtering.judging.equation3.score import leave_one_out
 from filtering.judging.equation3.sequence import transitions
-from filtering.judging.equation3.solver import Solver, concentrate, fill, kinds_of, thinned
+from filtering.judging.equation3.solver import Solver, concentrate, distinct_demos, fill, thinned
 from filtering.judging.equation3.solvers import SOLVERS, solver_named
 from teasim.common.errors import ConfigError
+from teasim.common.trimming import soft_trim
 from tests.filtering.simulator import SimulatedPool, pool_of
 
 ORDERS = [[0, 1, 2], [0, 1, 2], [0, 1, 2], [0, 2], [0, 1, 2], [1, 0, 2], [0, 1, 2, 2]]
@@ -225,11 +226,11 @@ def test_a_large_pool_is_solved_in_seconds() -> None:
 
 
 def test_kinds_are_numbered_by_content_and_name_their_first() -> None:
-    kinds, firsts = kinds_of(small())
+    kinds, firsts = distinct_demos(small())
     assert kinds[[0, 1, 2, 4]].tolist() == [kinds[0]] * 4
     assert len(firsts) == 4
     assert kinds[firsts].tolist() == [0, 1, 2, 3]
-    others, _ = kinds_of(small([6, 5, 4, 3, 2, 1, 0]))
+    others, _ = distinct_demos(small([6, 5, 4, 3, 2, 1, 0]))
     assert others.tolist() == kinds[::-1].tolist()
 
 
@@ -255,7 +256,8 @@ def test_trust_and_fill_spend_m_and_prefer_low_losses(
     losses, sizes = np.array([loss for loss, _ in kinds]), np.array([n for _, n in kinds], float)
     trusted = share * sizes.sum()
     order = np.argsort(losses, kind="stable")
-    for weights in (trust(losses, sizes, trusted, tau), fill(losses, sizes, trusted)):
+    soft = sizes * soft_trim(losses, sizes, trusted, tau)
+    for weights in (soft, fill(losses, sizes, trusted)):
         assert ((weights >= 0) & (weights <= sizes)).all()
         assert weights.sum() == pytest.approx(trusted, abs=1e-6)
         assert (np.diff((weights / sizes)[order]) <= 1e-12).all()

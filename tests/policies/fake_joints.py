@@ -6,10 +6,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from policies.play.rollout import EnvironmentConfig
+from policies.settings import EnvironmentConfig
 from teasim.constants import STATE_NAMES, SUBTASKS
 from teasim.pool import EpisodeRecord, EpisodeWriter, Pool, PoolHeader, Span, finalize_pool
-from tests.policies.fakes import FLAGS, SEQ_1, SIZE, flags
+from tests.policies.fakes import FLAGS, KINDS, SEQ_1, SIZE, flags
 
 JOINTS = len(STATE_NAMES)
 PLACES = np.random.default_rng(5).uniform(-1, 1, (len(SUBTASKS), JOINTS))
@@ -21,6 +21,8 @@ FAKE_JOINTS = EnvironmentConfig(FAKE_JOINTS_ID, max_actions=None)
 
 class FakeJoints(gym.Env[dict[str, Any], Any]):
     """Joints go where they are told; the next sub-task of Seq_1 is done where its place is."""
+
+    metadata = {"render_modes": [], "violation_kinds": KINDS}  # noqa: RUF012
 
     def __init__(
         self, obs_type: str = "state", quality: str = "fast", randomize: bool = True

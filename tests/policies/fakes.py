@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from policies.data.samples import Observation, ObservationSpec, RecurrentState
-from policies.play.rollout import EnvironmentConfig
+from policies.settings import EnvironmentConfig
 from teasim.constants import STATE_NAMES, SUBTASKS
 from teasim.pool import EpisodeRecord, EpisodeWriter, Pool, PoolHeader, Span, finalize_pool
 
@@ -18,6 +18,9 @@ BEFORE = ((0, 6), (6, 1), (4, 5), (1, 5), (2, 5), (3, 5), (0, 1), (0, 2), (0, 3)
 SIZE = 64
 FLAGS = tuple(f"{name}_done" for name in SUBTASKS)
 """The environment state."""
+
+KINDS = {"stove left on": ("unsafe",), "spilled": ("spilled_water", "spilled_milk")}
+"""Kinds of violation, in words that are in no other file: words -> keys."""
 
 FAKE_ID = "tests.policies.fakes:teasim-tests/Fake-v0"
 FAKE_WORLD = EnvironmentConfig(FAKE_ID)
@@ -41,7 +44,7 @@ def flags(done: set[int]) -> NDArray[np.float32]:
 class FakeTea(gym.Env[dict[str, Any], int]):
     """The sub-task environment without physics: every allowed action works, others do nothing."""
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 1, "violation_kinds": KINDS}  # noqa: RUF012
 
     def __init__(
         self,

@@ -82,10 +82,11 @@ def test_the_table_puts_the_training_seeds_together(done):
     line = next(x for x in table.splitlines() if x.startswith("| pool | labels | r-maxent | "))
     assert "| 100.0 % (" in line
     assert "| 100.0, 100.0 |" in line
-    assert "policy accuracy beside 'all'" in table
+    assert "policy accuracy against 'all'" in table
+    assert "| goal reached | stove left on | spilled |" in table
 
 
-def test_what_is_there_is_not_done_again(folder, done, monkeypatch):
+def test_what_is_there_is_not_done_again(folder, done, monkeypatch, capsys):
     gone = done / "cells" / "pool--all--bc--1.json"
     before = gone.read_bytes()
     table = (done / "results.md").read_text()
@@ -93,12 +94,31 @@ def test_what_is_there_is_not_done_again(folder, done, monkeypatch):
     ran = []
     real = ablation._run_cell
     monkeypatch.setattr(
-        ablation, "_run_cell", lambda todo, *rest: ran.append(todo.cell) or real(todo, *rest)
+        ablation, "_run_cell", lambda run, *rest: ran.append(run.cell) or real(run, *rest)
     )
+    capsys.readouterr()
     ablate([str(folder / "plan.toml"), "-o", str(done), "--jobs", "1"])
+    assert capsys.readouterr().err == "11 of 12 runs are done; continuing.\n"
     assert [(cell.filter, cell.learner, cell.seed) for cell in ran] == [("all", "bc", 1)]
     assert gone.read_bytes() == before
     assert (done / "results.md").read_text() == table
+
+
+def test_a_learner_may_have_settings_and_a_name_of_its_own(folder, tmp_path):
+    table = '[learners.bc]\n[learners.tiny]\nlearner = "bc-rnn"\nhidden = 2\nsteps = 3\n'
+    head = SETTINGS.replace('learners = ["bc", "r-maxent"]\n', "").replace("[0, 1]", "[0]")
+    (folder / "tables.toml").write_text(
+        'pools = ["pool"]' + head + table + '[filters.all]\nuse = "ignore"\n'
+    )
+    assert ablate([str(folder / "tables.toml"), "-o", str(tmp_path), "--jobs", "1"]) == 0
+    cell = json.loads((tmp_path / "cells" / "pool--all--tiny--0.json").read_text())
+    assert (cell["settings"]["hidden"], cell["settings"]["steps"]) == (2, 3)
+    assert "| pool | all | tiny | " in (tmp_path / "results.md").read_text()
+
+
+def test_a_finished_ablation_says_so(folder, done, capsys):
+    ablate([str(folder / "plan.toml"), "-o", str(done), "--jobs", "1"])
+    assert capsys.readouterr().err == "All 12 runs are done.\n"
 
 
 def refused(call):
@@ -133,7 +153,7 @@ POOLS = 'pools = ["pool"]\n'
         ),
         ("pools = []\n" + FILTERS, "'pools' is empty; name one or more."),
         ('pools = ["a/p", "b/p"]\n' + FILTERS, "Two pools have the same name: p, p."),
-        (POOLS + "seeds = [0, 0]\n" + FILTERS, "'seeds' holds something twice."),
+        (POOLS + "seeds = [0, 0]\n" + FILTERS, "'seeds' has a duplicate entry."),
         (POOLS + "seeds = [true]\n" + FILTERS, "'seeds' must be a list of int."),
         (POOLS + 'episodes = "2"\n' + FILTERS, "'episodes' must be of type int."),
         (POOLS + "episodes = 0\n" + FILTERS, "episodes is 0; choose 1 or more."),
@@ -144,13 +164,30 @@ POOLS = 'pools = ["pool"]\n'
         ),
         (
             POOLS + 'learners = ["demodice"]\n' + FILTERS,
-            "A learner needs demonstrations known to be good; set 'expert'.",
+            "The learner 'demodice' needs demonstrations known to be good; set 'expert'.",
         ),
         (
             POOLS + '[filters.a]\nuse = "drop"',
             "The filter 'a' has the unknown use 'drop'; choose discard, weight, ignore, labels.",
         ),
         (POOLS + "[filters.a]\nframes_per_segment = 'x'", "The filter 'a' has a setting of "),
+        (
+            POOLS + "[learners.bc]\nhidden = 2\n" + FILTERS,
+            "The learner 'bc' has no setting 'hidden'; choose bottleneck, steps, ",
+        ),
+        (
+            POOLS + "[learners.bc]\nsteps = '2'\n" + FILTERS,
+            "The setting 'steps' of the learner 'bc' must be a whole number or none, not '2'.",
+        ),
+        (POOLS + "[learners.mine]\n" + FILTERS, "Unknown learner 'mine'; choose bc, "),
+        (
+            POOLS + "learners = 3\n" + FILTERS,
+            "'learners' must be a list of str, or tables, [learners.NAME] each.",
+        ),
+        (
+            POOLS + '[learners."a/b"]\nlearner = "bc"\n' + FILTERS,
+            "The learner 'a/b' names files; use letters, digits, '_', '.', '+' and '-' only.",
+        ),
         (POOLS + "[filters.a]\nmaximum = 1", "The filter 'a' has the unknown setting 'maximum'; "),
     ],
 )
@@ -173,6 +210,10 @@ def test_the_example_of_the_manual_can_be_read(tmp_path):
     path.write_text("\n".join(example))
     config = AblationConfig.read(path)
     assert config.pools == (tmp_path / "pools/a", tmp_path / "pools/b")
+    assert [(v.name, v.learner, v.settings) for v in config.learners] == [
+        ("bc", "bc", {}),
+        ("large", "bc-rnn", {"hidden": 128}),
+    ]
     assert [(f.name, f.use) for f in config.filters] == [
         ("all", "ignore"),
         ("norm", "discard"),

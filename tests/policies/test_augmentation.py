@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from policies.data.augmentation import LIGHT, NOISE, SHIFT, views
+from policies.data.features import LIGHT, NOISE, SHIFT, views
 
 
 def test_the_first_view_is_the_frame_itself():

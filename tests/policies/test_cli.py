@@ -1,18 +1,24 @@
 """train, then evaluate, as a user calls them; exit codes and sentences."""
 
 import json
+import shlex
 import xml.etree.ElementTree as ElementTree
 
 import pytest
+import tyro
 
+import policies
+from policies import cli, settings
 from policies.checkpoint import load_policy, save_policy
 from policies.cli import evaluate, train
 from policies.learners.registry import LEARNERS
-from policies.play.rollout import ENVIRONMENT
+from policies.settings import EnvironmentConfig, TrainSettings
 from teasim.common.errors import CheckpointError, ConfigError, PoolError, TeasimError
 from teasim.pool.weight_table import WeightRow, write_weight_table
 from tests.policies.fakes import FAKE_ID
 from tests.policies.learning import AT_SUBTASKS
+
+SETTINGS = {verb: getattr(settings, f"{verb.title()}Settings") for verb in cli.EXAMPLES}
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +113,54 @@ def test_experts_are_named_by_episode_or_have_the_largest_weights(fake_pool, tmp
     assert found == [[1, 3], [5]]
 
 
+def settings_of(run):
+    return json.loads((run / "policy.json").read_text())["training"]["settings"]
+
+
+def test_settings_of_the_learner_are_used_and_stored(fake_pool, tmp_path):
+    options = ["--observe", "state", "--jobs", "1", "--learner", "bc-rnn"]
+    options += ["--set", "hidden=3", "--set", "learning-rate=1", "--set", "steps=2"]
+    assert train([str(fake_pool.root), *options, "-o", str(tmp_path / "run")]) == 0
+    used = settings_of(tmp_path / "run")
+    assert (used["hidden"], used["learning_rate"], used["steps"]) == (3, 1.0, 2)
+    assert load_policy(tmp_path / "run").network.settings == {"hidden": 3}
+
+
+def test_cameras_may_be_repeated(fake_pool, tmp_path):
+    options = ["--camera", "cup", "--camera", "left", "--set", "steps=1", "--jobs", "1"]
+    assert train([str(fake_pool.root), *options, "-o", str(tmp_path / "run")]) == 0
+    assert load_policy(tmp_path / "run").spec.cameras == ("cup", "left")
+
+
+@pytest.mark.parametrize("verb", cli.EXAMPLES)
+def test_the_help_ends_with_examples_that_can_be_parsed(verb, capsys):
+    with pytest.raises(SystemExit) as leave:
+        getattr(cli, verb)(["--help"])
+    assert leave.value.code == 0
+    examples = capsys.readouterr().out.partition("examples:\n")[2].splitlines()
+    assert [line.strip() for line in examples] == list(cli.EXAMPLES[verb])
+    assert len(examples) == 2
+    for line in examples:
+        program, name, *words = shlex.split(line)
+        assert (program, name) == ("teasim", verb)
+        tyro.cli(SETTINGS[verb], args=words)
+
+
+def test_the_help_names_every_learner(capsys):
+    with pytest.raises(SystemExit):
+        train(["--help"])
+    printed = capsys.readouterr().out
+    assert [name for name in LEARNERS if name not in printed] == []
+
+
+def test_python_trains_what_the_command_line_trains(fake_pool, run, tmp_path):
+    done = policies.train(TrainSettings(fake_pool.root, tmp_path / "run", jobs=1))
+    assert str(done).startswith("bc on 7 of 7 demonstrations, 48 decisions, loss ")
+    for name in ("policy.safetensors", "policy.json"):
+        assert (tmp_path / "run" / name).read_bytes() == (run / name).read_bytes()
+    assert policies.load_policy(tmp_path / "run").action_names == done.policy.action_names
+
+
 def refused(error, call):
     with pytest.raises(error) as caught:
         call()
@@ -146,6 +200,29 @@ def test_a_folder_in_use_is_left_alone(fake_pool, tmp_path):
             ["--expert", "0"],
             "The learner 'bc' takes no --expert; only demodice does.",
         ),
+        (
+            ["--set", "hidden=3"],
+            "The learner 'bc' has no setting 'hidden'; "
+            "choose bottleneck, steps, learning_rate, weight_decay.",
+        ),
+        (["--set", "steps"], "--set 'steps' is not name=value; write --set steps=200."),
+        (
+            ["--set", "steps=1", "--set", "steps=2"],
+            "--set gives 'steps' twice; give it once.",
+        ),
+        (
+            ["--set", "bottleneck=1.5"],
+            "The setting 'bottleneck' of the learner 'bc' must be a whole number, not 1.5.",
+        ),
+        (
+            ["--set", "steps=many"],
+            "The setting 'steps' of the learner 'bc' must be a whole number or none, not 'many'.",
+        ),
+        (
+            ["--set", "learning_rate=nan"],
+            "The setting 'learning_rate' of the learner 'bc' must be a number, not nan.",
+        ),
+        (["--set", "bottleneck=0"], "bottleneck is 0; choose 1 or more."),
     ],
 )
 def test_bad_options_make_nothing(fake_pool, tmp_path, options, said):
@@ -178,13 +255,22 @@ def test_a_result_file_that_is_a_folder_is_found_before_the_work(run, tmp_path):
     assert said == f"The output file '{tmp_path}' is a folder; name a file in it."
 
 
-def test_the_usual_environment_is_the_tea_station():
-    assert ENVIRONMENT == "teasim:teasim/TeaMakingSubtasks-v0"
+@pytest.mark.parametrize(
+    ("level", "env_id", "max_actions"),
+    [
+        ("subtask", "teasim:teasim/TeaMakingSubtasks-v0", 14),
+        ("joint", "teasim:teasim/TeaMaking-v0", None),
+    ],
+)
+def test_the_default_environment_is_the_tea_station(level, env_id, max_actions):
+    config = EnvironmentConfig().at_level(level)
+    assert (config.env_id, config.max_actions) == (env_id, max_actions)
+    assert EnvironmentConfig("mine").at_level(level).env_id == "mine"
 
 
 def test_two_policies_are_compared_on_the_same_episodes(run, stirrer, tmp_path, capsys):
     assert try_out(run, "--against", stirrer, "--json", tmp_path / "s.json") == 0
-    assert f"beside {stirrer} on the same 3 episodes" in capsys.readouterr().out
+    assert f"against {stirrer} on the same 3 episodes" in capsys.readouterr().out
     saved = json.loads((tmp_path / "s.json").read_text())
     assert saved["against"] == str(stirrer)
     assert saved["comparison"]["deterministic"]["success"] == {

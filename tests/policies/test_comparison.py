@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from policies.play.comparison import compare, comparison_json, comparison_text
-from policies.play.evaluation import EvaluationConfig, evaluate
+from policies.play.evaluation import evaluate
+from policies.settings import EvaluationConfig
 from teasim.common.errors import ConfigError
 from teasim.common.statistics import bootstrap_difference, mcnemar
 from tests.policies.fakes import FAKE_WORLD, ScriptedPolicy
@@ -72,8 +73,9 @@ def test_two_policies_on_the_same_episodes(found):
     deterministic, sampled = compare(*found)
     assert (deterministic.mode, sampled.mode) == ("deterministic", "sampled")
     assert (deterministic.success.first, deterministic.success.second) == (6, 0)
+    stove = deterministic.violations["stove left on"]
     assert deterministic.success.p_value == pytest.approx(2 / 64)
-    assert (deterministic.unsafe.first, deterministic.unsafe.second) == (0, 6)
+    assert (stove.first, stove.second) == (0, 6)
     # All of 7 actions against 2 of 14, in every episode alike.
     assert deterministic.policy_accuracy.value == pytest.approx(1 - 2 / 14)
     assert deterministic.policy_accuracy.low == pytest.approx(1 - 2 / 14)
@@ -81,12 +83,14 @@ def test_two_policies_on_the_same_episodes(found):
 
 def test_the_comparison_in_words_and_json(found):
     comparisons = compare(*found)
-    assert comparison_text(comparisons[:1], "old") == (
-        "deterministic decisions, beside old on the same 6 episodes\n"
-        "  policy accuracy  +85.7 points (+85.7 to +85.7)\n"
-        "  goal reached     in 6 episodes by this one alone, in 0 by the other alone, p = 0.031\n"
-        "  oven left on     in 0 episodes by this one alone, in 6 by the other alone, p = 0.031"
-    )
+    lines = comparison_text(comparisons[:1], "old").splitlines()
+    assert lines[:4] == [
+        "deterministic decisions, against old on the same 6 episodes",
+        "  policy accuracy  +85.7 points (+85.7 to +85.7)",
+        "  goal reached     with this one only in 6 episodes, with the other only in 0, p = 0.031",
+        "  stove left on    with this one only in 0 episodes, with the other only in 6, p = 0.031",
+    ]
+    assert lines[4].startswith("  spilled          with this one only in 0 episodes,")
     assert comparison_json(comparisons)["sampled"]["success"]["first"] == 6
 
 

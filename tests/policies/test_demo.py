@@ -7,13 +7,16 @@ import pytest
 
 from policies.cli import demo as demo_verb
 from policies.experiments import demo
-from policies.experiments.demo import ALL, KEPT, DemoConfig, run_demo
-from policies.play.rollout import EnvironmentConfig
+from policies.experiments.demo import ALL, KEPT, run_demo
+from policies.settings import DemoSettings, EnvironmentConfig
 from teasim.common.errors import ConfigError, PoolError
 from tests.policies.conftest import WITHOUT_TEA_BAG
 from tests.policies.fakes import FAKE_ID, SEQ_1, make_fake_pool
 
-CONFIG = DemoConfig(6, 2, episodes=2, environment=EnvironmentConfig(FAKE_ID))
+
+def settings(out):
+    world = EnvironmentConfig(FAKE_ID)
+    return DemoSettings(out=out, seq1=6, seq3=2, episodes=2, environment=world, jobs=1)
 
 
 def fake_generate(path, config, jobs):
@@ -26,7 +29,7 @@ def done(tmp_path_factory):
     out = tmp_path_factory.mktemp("demo") / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(demo, "generate_pool", fake_generate)
-        return out, run_demo(out, CONFIG, jobs=1)
+        return out, run_demo(settings(out))
 
 
 def test_everything_is_in_its_place(done):
@@ -100,7 +103,7 @@ def test_more_incorrect_demonstrations_than_correct_ones_are_refused(tmp_path):
 def test_a_failed_generation_says_its_own_sentence(tmp_path):
     (tmp_path / "pool").write_text("in the way")
     with pytest.raises(PoolError) as error:
-        demo.generate_pool(tmp_path / "pool", CONFIG, 1)
+        demo.generate_pool(tmp_path / "pool", settings(tmp_path), 1)
     assert str(error.value) == (
         f"'{tmp_path / 'pool'}' is a file; choose a folder that is new or empty."
     )

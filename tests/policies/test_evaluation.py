@@ -1,12 +1,15 @@
 """A policy whose every choice is known gets exactly the scores that follow from them."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from policies.data.samples import ObservationSpec
-from policies.play.captions import STRIP, caption
-from policies.play.evaluation import MODES, EvaluationConfig, evaluate, score
-from policies.play.rollout import EnvironmentConfig, Episode, make_environment, run_episode
+from policies.play.environments import make_environment, reported, violation_words
+from policies.play.evaluation import MODES, evaluate
+from policies.play.rollout import run_episode
+from policies.play.video import STRIP, caption
+from policies.settings import EnvironmentConfig, EvaluationConfig
 from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.statistics import rate
 from teasim.constants import STATE_NAMES
@@ -24,9 +27,9 @@ def test_the_reference_order_scores_100_percent_in_both_modes():
     for s in scores.values():
         assert s.policy_accuracy.hits == s.policy_accuracy.trials == 21
         assert s.lenient_accuracy.value == s.success.value == 1
-        assert s.unsafe.value == 0
         assert all(done == rate(3, 3) for done in s.completion.values())
-        assert s.violations == {}
+        assert s.violations == {"stove left on": rate(0, 3), "spilled": rate(0, 3)}
+        assert s.violation_counts == {}
         assert [episode.seed for episode in s.episodes] == [1000, 1001, 1002]
 
 
@@ -39,15 +42,16 @@ def test_another_legal_order_is_lenient_but_not_strict():
 
 def test_an_oven_left_on_is_unsafe_and_a_stuck_policy_is_cut_off():
     s = evaluate(ScriptedPolicy((0, 4, 4, 4, 4, 4, 4)), config(2))["deterministic"]
-    assert s.unsafe.value == 1
+    assert s.violations["stove left on"].value == 1
     assert s.success.value == 0
     assert s.policy_accuracy.hits == 4
     assert s.policy_accuracy.trials == 28
     assert s.completion["add_tea_bag"].value == 1
     assert s.completion["stir"].value == 0
-    assert s.violations == {
+    assert s.violation_counts == {
         "add_tea_bag too early or again": 2,
         "turn_on_oven too early or again": 2,
+        "unsafe": 2,
     }
 
 
@@ -131,6 +135,26 @@ def test_a_caption_leaves_the_picture_alone_and_fits():
     assert not lit[-2:].any()
 
 
-def test_spills_are_counted_by_episode():
-    seen = [Episode(0, (), False, False, (), rules) for rules in (("spilled_water",), ("x",), ())]
-    assert score("sampled", seen, ()).spills == rate(1, 3)
+class Reports(gym.Env):
+    """An environment of which only what it says at the end matters."""
+
+    def __init__(self, **named):
+        self.metadata = {"render_modes": [], **named}
+
+
+def kinds_of(env, violations, *, unsafe=False):
+    info = {"success": False, "subtasks_done": (), "violations": violations, "unsafe": unsafe}
+    return reported(env, 0, info)["kinds"]
+
+
+def test_keys_of_one_kind_are_counted_together_and_a_kind_that_did_not_occur_is_listed():
+    env = Reports(violation_kinds={"wet": ("spilled_a", "spilled_b"), "hot": ("unsafe",)})
+    assert violation_words(env) == {"spilled_a": "wet", "spilled_b": "wet", "unsafe": "hot"}
+    assert kinds_of(env, ("spilled_a", "spilled_b")) == {"wet": True, "hot": False}
+    assert kinds_of(env, (), unsafe=True) == {"wet": False, "hot": True}
+    assert kinds_of(env, ("unsafe",), unsafe=True) == {"wet": False, "hot": True}
+
+
+def test_a_violation_without_words_is_listed_by_its_key():
+    assert kinds_of(Reports(), ("too_fast",), unsafe=True) == {"too fast": True, "unsafe": True}
+    assert kinds_of(Reports(violations={"x": "broken cup"}), ()) == {"broken cup": False}

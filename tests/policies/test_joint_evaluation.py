@@ -8,11 +8,11 @@ import pytest
 from policies.checkpoint import load_policy
 from policies.cli import evaluate, train
 from policies.data.samples import ObservationSpec
-from policies.play.evaluation import EvaluationConfig
+from policies.play.environments import make_environment
 from policies.play.joint_evaluation import evaluate_motion, score_motion
-from policies.play.joint_results import mean_done, motion_summary
-from policies.play.joint_rollout import JOINT_ENVIRONMENT, PATIENCE, MotionEpisode, run_motion
-from policies.play.rollout import make_environment
+from policies.play.joint_rollout import PATIENCE, MotionEpisode, run_motion
+from policies.play.results import motion_summary
+from policies.settings import EvaluationConfig
 from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.statistics import rate
 from teasim.constants import SUBTASKS
@@ -62,7 +62,7 @@ def test_workers_change_nothing(run):
     assert evaluate_motion(policy, config, jobs=2) == evaluate_motion(policy, config)
 
 
-class Idle:
+class Still:
     """Holds all joints at 0."""
 
     spec = ObservationSpec((), 0, 0, ("j",) * 16, ("f",) * 7)
@@ -75,20 +75,20 @@ class Idle:
         return np.zeros(16), None
 
 
-def test_who_does_nothing_is_not_waited_for_longer_than_the_patience():
-    with make_environment(FAKE_JOINTS, Idle.spec) as env:
-        episode = run_motion(env.unwrapped, Idle(), 0, deterministic=True)
+def test_an_episode_without_a_new_subtask_ends_after_the_patience():
+    with make_environment(FAKE_JOINTS, Still.spec) as env:
+        episode = run_motion(env.unwrapped, Still(), 0, deterministic=True)
         assert (episode.steps, episode.last, episode.success) == (PATIENCE, "none", False)
-        assert run_motion(env, Idle(), 0, deterministic=True).steps == 120
+        assert run_motion(env, Still(), 0, deterministic=True).steps == 120
 
 
 def test_a_policy_for_other_joints_or_another_state_is_refused():
-    policy = Idle()
+    policy = Still()
     policy.action_names = ("elbow",)
-    with make_environment(FAKE_JOINTS, Idle.spec) as env:
+    with make_environment(FAKE_JOINTS, Still.spec) as env:
         with pytest.raises(CheckpointError, match=r"^The policy controls 1 joints, but the env"):
             run_motion(env, policy, 0, deterministic=True)
-        policy = Idle()
+        policy = Still()
         policy.spec = ObservationSpec((), 0, 0, ("elbow",))
         with pytest.raises(CheckpointError) as error:
             run_motion(env, policy, 0, deterministic=True)
@@ -98,7 +98,15 @@ def test_a_policy_for_other_joints_or_another_state_is_refused():
 
 
 def episode(done, *, success=False, violations=()):
-    return MotionEpisode(0, 100, ("a", "b", "c"), success, False, done, violations)
+    return MotionEpisode(
+        seed=0,
+        steps=100,
+        subtasks=("a", "b", "c"),
+        success=success,
+        subtasks_done=done,
+        violations=violations,
+        kinds={"spilled": bool(violations)},
+    )
 
 
 def test_the_scores_of_known_episodes():
@@ -108,11 +116,11 @@ def test_the_scores_of_known_episodes():
         episode(()),
     ]
     s = score_motion("sampled", played)
-    assert mean_done(s) == pytest.approx(4 / 3)
-    assert s.success == s.spills == rate(1, 3)
+    assert s.mean_done == pytest.approx(4 / 3)
+    assert s.success == s.violations["spilled"] == rate(1, 3)
     assert s.completion == {"a": rate(2, 3), "b": rate(1, 3), "c": rate(1, 3)}
     assert s.stopped_after == {"none": 1, "a": 1}
-    assert s.violations == {"spilled_milk": 1}
+    assert s.violation_counts == {"spilled_milk": 1}
     text = motion_summary({"sampled": s})
     assert "  sub-tasks done   1.33 of 3 per episode (" in text
     assert text.endswith("  stopped after    none in 1, a in 1")
@@ -134,7 +142,3 @@ def test_what_is_about_choices_is_refused(run, options):
         "A policy at the joint level chooses no sub-tasks; leave out --min-policy-accuracy, "
         "--against, --junit and --video."
     )
-
-
-def test_the_usual_environment_is_the_tea_station_at_the_joint_level():
-    assert JOINT_ENVIRONMENT == "teasim:teasim/TeaMaking-v0"

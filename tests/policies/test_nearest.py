@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from policies.learners.chunks import EARLIER, LATER
+from policies.learners.store import EARLIER, LATER
 from tests.policies.learning import make
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from policies import cli
+from policies.experiments import ablation_config
 from policies.learners.registry import LEARNERS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -38,14 +39,29 @@ def test_the_build_sets_a_bar_and_keeps_the_scores():
     assert {"--min-policy-accuracy", "--json", "--episodes", "--seed"} <= set(options)
 
 
-def test_every_learner_is_in_the_table():
-    assert re.findall(r"^\| `([a-z][\w-]*)` \|", PAGES["policies.md"], re.MULTILINE) == list(
-        LEARNERS
-    )
+def test_every_learner_is_in_both_tables():
+    rows = re.findall(r"^\| `([a-z][\w-]*)` \|", PAGES["policies.md"], re.MULTILINE)
+    assert rows == [*LEARNERS, *LEARNERS]
+
+
+def test_the_settings_of_every_learner_are_on_the_page():
+    table = PAGES["policies.md"].partition("## Settings of a learner")[2].partition("## Python")[0]
+    rows = dict(re.findall(r"^\| `([\w-]+)` \| (.+) \|$", table, re.MULTILINE))
+    told = {
+        name: tuple(row.replace("those of `bc`", rows["bc"]).split(", "))
+        for name, row in rows.items()
+    }
+    assert told == {name: kind.options for name, kind in LEARNERS.items()}
+
+
+def test_the_plan_on_the_page_is_that_of_the_module():
+    (plan,) = re.findall(r"```toml\n(.*?)```", PAGES["policies.md"], re.DOTALL)
+    lines = [line[4:] for line in ablation_config.__doc__.splitlines() if line[:4] == "    "]
+    assert [line for line in plan.splitlines() if line] == lines
 
 
 def test_what_the_python_imports_exists():
     imports = re.findall(r"^from ([\w.]+) import (.+)$", PAGES["policies.md"], re.MULTILINE)
-    assert len(imports) == 5
+    assert len(imports) == 6
     for module, names in imports:
         assert all(hasattr(import_module(module), name) for name in names.split(", "))

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from policies.learners.r_maxent import (
+    Problem,
     RMaxEntConfig,
-    Rows,
     demo_losses,
     fit_multipliers,
     solve,
-    trust,
 )
+from teasim.common.trimming import soft_trim
 from tests.policies.learning import make
 
 STATES = 5
@@ -24,7 +24,7 @@ def five_states(wrong=(2,), demos=4):
     """Every demonstration passes states 0 to 4 and chooses 0; the last errs in states `wrong`."""
     labels = np.zeros((demos, STATES), dtype=np.int64)
     labels[-1, list(wrong)] = 1
-    return Rows(
+    return Problem(
         np.tile(np.eye(STATES), (demos, 1)),
         labels.ravel(),
         np.repeat(np.arange(demos), STATES),
@@ -62,7 +62,7 @@ loss_lists = arrays(float, st.integers(2, 9), elements=st.floats(0, 10))
 @given(loss_lists, st.floats(0.05, 0.95), st.floats(0.01, 1.0))
 def test_trust_sums_to_m_and_falls_with_the_loss(losses, share, temperature):
     copies = np.linspace(0.5, 2, len(losses))
-    weights = trust(losses, copies, share * copies.sum(), temperature)
+    weights = soft_trim(losses, copies, share * copies.sum(), temperature)
     assert copies @ weights == pytest.approx(share * copies.sum())
     assert ((weights >= 0) & (weights <= 1)).all()
     assert (np.diff(weights[np.argsort(losses)]) <= 1e-12).all()
@@ -70,7 +70,7 @@ def test_trust_sums_to_m_and_falls_with_the_loss(losses, share, temperature):
 
 def test_the_multipliers_match_the_feature_expectations():
     random = np.random.default_rng(0)
-    rows = Rows(
+    rows = Problem(
         random.normal(size=(12, 4)),
         random.integers(0, 3, 12),
         np.repeat(np.arange(3), [3, 4, 5]),

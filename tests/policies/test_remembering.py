@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from policies.play import evaluation, remembering
-from policies.play.evaluation import EvaluationConfig, evaluate, evaluate_all
+from policies.play import remembering
+from policies.play.environments import make_environment
+from policies.play.evaluation import evaluate, evaluate_all
 from policies.play.remembering import Remembering, can_remember
-from policies.play.rollout import make_environment
+from policies.settings import EnvironmentConfig, EvaluationConfig
 from tests.policies.fakes import FAKE_WORLD, SEQ_1, FakeTea, ScriptedPolicy
 
 
@@ -91,7 +92,7 @@ def test_scenes_not_played_for_long_are_forgotten(monkeypatch):
 
 @pytest.mark.parametrize("given", [{}, {"seed": 0, "options": {"randomize": False}}])
 def test_a_scene_that_its_seed_does_not_tell_is_refused(given):
-    with pytest.raises(ValueError, match="give one and no options"):
+    with pytest.raises(ValueError, match="give one, and no options"):
         Remembering(GoingBack()).reset(**given)
 
 
@@ -102,7 +103,7 @@ def test_worlds_that_cannot_go_back_are_left_as_they_are():
 
 
 def test_the_tea_station_can_be_remembered():
-    env = make_environment(evaluation.EnvironmentConfig(), ScriptedPolicy.spec)
+    env = make_environment(EnvironmentConfig(), ScriptedPolicy.spec)
     assert can_remember(env)
     env.close()
 

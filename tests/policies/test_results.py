@@ -6,32 +6,39 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 
 from policies.play.evaluation import score
-from policies.play.results import Bar, summary, write_junit, write_scores
+from policies.play.junit import Bar, write_junit
+from policies.play.results import as_json, summary
 from policies.play.rollout import Action, Episode
 from teasim.common.errors import ConfigError
 
 
 def scores_of(*correct):
     actions = tuple(Action("stir", "add_water", c, c) for c in correct)
-    episodes = [Episode(7, actions, all(correct), False, (), ())]
+    episodes = [
+        Episode(
+            seed=7,
+            actions=actions,
+            success=all(correct),
+            subtasks_done=(),
+            violations=("on_fire",),
+            kinds={"kitchen on fire": True, "spilled": False},
+        )
+    ]
     return {mode: score(mode, episodes, ("stir",)) for mode in ("deterministic", "sampled")}
 
 
-def test_json_has_rates_in_percent_and_every_episode(tmp_path):
-    write_scores(tmp_path / "s.json", scores_of(True, False), {"run": "r"})
-    saved = json.loads((tmp_path / "s.json").read_text())
-    assert saved["run"] == "r"
-    s = saved["scores"]["sampled"]
+def test_json_has_rates_in_percent_and_every_episode():
+    s = json.loads(json.dumps(as_json(scores_of(True, False))))["sampled"]
     assert s["policy_accuracy"]["percent"] == 50
     assert s["policy_accuracy"]["hits"] == 1
-    assert s["spills"]["percent"] == s["completion"]["stir"]["percent"] == 0
+    assert s["completion"]["stir"]["percent"] == s["violations"]["spilled"]["percent"] == 0
+    assert s["violations"]["kitchen on fire"]["percent"] == 100
+    assert s["violation_counts"] == {"on_fire": 1}
     assert [a["correct"] for a in s["episodes"][0]["actions"]] == [True, False]
 
 
-def test_no_action_at_all_is_null(tmp_path):
-    write_scores(tmp_path / "s.json", scores_of(), {})
-    saved = json.loads((tmp_path / "s.json").read_text())
-    assert saved["scores"]["sampled"]["policy_accuracy"]["percent"] is None
+def test_no_action_at_all_is_null():
+    assert as_json(scores_of())["sampled"]["policy_accuracy"]["percent"] is None
     assert not Bar(50).passed(scores_of())
 
 
@@ -52,21 +59,22 @@ def test_junit_without_a_bar_never_fails_and_tells_the_story(tmp_path):
     write_junit(tmp_path / "j.xml", scores_of(False), None)
     root = ElementTree.parse(tmp_path / "j.xml").getroot()
     assert root.find(".//failure") is None
-    story = "stir (reference: add_water): goal not reached"
+    story = "stir (reference: add_water): goal not reached, kitchen on fire"
     assert root.find(".//system-out").text == story
 
 
 def test_summary_is_in_percent():
     text = summary(scores_of(True, False))
     assert "policy accuracy  50.0 % (" in text
-    assert "spilled 0.0 % (" in text
+    assert "  kitchen on fire  100.0 % (" in text
+    assert "  spilled          0.0 % (" in text
     assert "  stir             done in 0.0 % (" in text
 
 
 @pytest.mark.parametrize(
     ("percent", "sentence"),
     [
-        (101, "A policy accuracy of 101 % cannot be; choose 0 to 100."),
+        (101, "The least policy accuracy is 101 %; choose a number from 0 to 100."),
         (
             0.9,
             "The least policy accuracy is in percent: 0.9 would be 0.9 %; write 90 for that share.",

@@ -98,8 +98,8 @@ def test_a_memory_or_an_ensemble_cannot_become_ppo(name, from_state):
     with pytest.raises(ConfigError) as error:
         as_ppo(policy, sb3_environment(FAKE_WORLD, STATE))
     assert str(error.value) == (
-        "Only a policy that sees the state and has neither memory nor members can become a PPO "
-        "model; train with --observe state and --learner bc, demodice or r-maxent."
+        "Only a policy that sees the state and is neither recurrent nor an ensemble can become "
+        "a PPO model; train with --observe state and --learner bc, demodice or r-maxent."
     )
 
 

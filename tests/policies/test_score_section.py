@@ -9,7 +9,14 @@ from policies.play.rollout import Action, Episode
 
 def scores_of(hits, trials):
     episodes = [
-        Episode(seed, (Action("stir", "stir", seed < hits, True),), True, False, (), ())
+        Episode(
+            seed=seed,
+            actions=(Action("stir", "stir", seed < hits, True),),
+            success=True,
+            subtasks_done=(),
+            violations=(),
+            kinds={"stove <left> on": False},
+        )
         for seed in range(trials)
     ]
     return {"sampled": score("sampled", episodes, ("stir",))}
@@ -38,4 +45,5 @@ def test_markup_is_well_formed_and_needs_nothing_from_outside():
     tree = ElementTree.fromstring(f"<div>{html}</div>")
     assert len(tree.findall(".//circle")) == 1
     assert len(tree.findall(".//tbody/tr")) == 2
+    assert [head.text for head in tree.findall(".//th")][-1] == "stove <left> on"
     assert "http" not in html

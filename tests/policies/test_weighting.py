@@ -1,9 +1,12 @@
 """A weight table meets a pool: matched by demonstration, refused when it is not the pool's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from policies.data.weighting import demo_weights, weighted_moments
+from policies.data.moments import weighted_moments
+from policies.data.weighting import demo_weights
 from teasim.common.errors import ConfigError
 from teasim.pool.weight_table import WeightRow, write_weight_table
 
@@ -66,12 +69,16 @@ def test_a_use_without_a_table_is_refused(fake_pool):
     )
 
 
-def test_a_table_of_another_pool_is_refused(human_pool, fake_pool, rows, table):
-    path = table(rows)
-    assert sentence(human_pool, path, "weight") == (
+def test_a_table_of_another_pool_is_refused(fake_pool, rows, table):
+    path = table([replace(row, demo_id=f"v2-{place:016x}") for place, row in enumerate(rows)])
+    assert sentence(fake_pool, path, "weight") == (
         f"The weight table '{path}' is for another pool: "
-        f"it has no demonstration of '{human_pool.root}'."
+        f"it has no demonstration of '{fake_pool.root}'."
     )
+
+
+def test_a_table_fits_the_same_videos_without_the_joint_log(human_pool, rows, table):
+    np.testing.assert_array_equal(demo_weights(human_pool, table(rows), "weight"), [0.9])
 
 
 def test_a_table_that_lacks_demonstrations_is_refused(fake_pool, rows, table):

@@ -69,7 +69,7 @@ def robomimic(root: Path) -> Path:
         data.attrs["env_args"] = json.dumps({"type": 1, "env_kwargs": {"control_freq": 10}})
         for demo, length in enumerate(LENGTHS):
             robomimic_demo(data, demo, length)
-        file["mask/train"] = np.array(["demo_0", "demo_2"], "S")
+        file["mask/train"] = np.array(["demo_0", "demo_2", "demo_3"], "S")
     return path
 
 

@@ -169,8 +169,8 @@ def test_labels_of_a_few_frames_more_or_less_than_features(tmp_path: Path, frame
     opened = MSTCNFolder.open(root)
     assert opened.features("a").shape == (min(frames, 100), 2048)
     assert opened.notes() == (
-        f"Labels and features of 1 videos of '{root}' differ by a few frames, and the longer is "
-        "cut: a.",
+        f"In 1 of 1 videos of '{root}' labels and features differ by a few frames, and the longer "
+        "is cut: a.",
     )
 
 

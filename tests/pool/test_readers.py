@@ -164,8 +164,8 @@ def test_without_h5py_the_install_line_is_told(
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("videos", {"fps": 5.0}, "folder of videos, which has no use for fps; leave it out."),
-        ("aloha", {"mask": "train"}, "ALOHA episodes, which has no use for mask; leave it out."),
+        ("videos", {"fps": 5.0}, "' (folder of videos); leave it out."),
+        ("aloha", {"mask": "train"}, "' (folder of ALOHA episodes); leave it out."),
         ("robomimic", {"fps": 5.0}, "' stores its own frame rate, 10; leave out fps."),
         ("robomimic", {"mask": "x"}, "' has no mask 'x'; it has train."),
         ("ms_tcn", {"background_label": ("x",)}, "'; choose from pour, stir."),
@@ -212,18 +212,23 @@ def test_a_picture_that_does_not_decode_is_found(
 
 def test_a_mask_and_the_notes_of_a_robomimic_file(inputs: dict[str, Path]) -> None:
     source = open_source(inputs["robomimic"], ReadOptions(mask="train"))
-    assert [(demo.index, demo.name) for demo in source.episodes] == [(0, "demo_0"), (2, "demo_2")]
+    assert [(demo.index, demo.name) for demo in source.episodes] == [
+        (0, "demo_0"),
+        (2, "demo_2"),
+        (3, "demo_3"),
+    ]
     assert source.entries([2]) == ["demo_2"]
     assert source.cameras == ("agentview_image", "wrist_rgb")
     assert source.fps == 10
-    assert source.notes == ("'demo.hdf5' has masks, with --mask NAME only one is read: train (2).",)
+    assert source.notes == ("'demo.hdf5' has masks, of which --mask NAME reads one: train (3).",)
 
 
 def test_the_kept_ones_become_a_mask(inputs: dict[str, Path], tmp_path: Path) -> None:
     path = copy(inputs, "robomimic", tmp_path / "with blank")
-    line = open_source(path).usage([1, 3], keep=True)[0]
-    command = shlex.split(line.removeprefix("robomimic: ").partition("   (")[0])
-    subprocess.run([sys.executable, *command[1:]], check=True)
+    for indexes in ([0], [1, 3]):  # a mask of that name is replaced
+        line = open_source(path).usage(indexes, keep=True)[0]
+        command = shlex.split(line.removeprefix("robomimic: ").partition("   (")[0])
+        subprocess.run([sys.executable, *command[1:]], check=True)
     kept = open_source(path, ReadOptions(mask="keep"))
     assert [demo.name for demo in kept.episodes] == ["demo_1", "demo_3"]
 
@@ -279,8 +284,7 @@ def test_an_assumed_rate_is_told(inputs: dict[str, Path], tmp_path: Path) -> Non
     source = open_source(path)
     assert source.fps == 20
     assert source.notes[0] == (
-        "'demo.hdf5' does not store its frame rate; 20 per second are assumed, --fps says "
-        "otherwise."
+        "'demo.hdf5' does not store its frame rate; 20 Hz is assumed, set --fps to change it."
     )
     assert open_source(path, ReadOptions(fps=7)).fps == 7
 
@@ -318,8 +322,8 @@ def test_a_minari_id_is_found(
     assert source.root == tmp_path / "squares" / "top-v0"
     assert source.cameras == ("views.pixels",)
     assert source.notes == (
-        "A Minari data set does not store its frame rate; 20 per second are assumed, --fps says "
-        "otherwise.",
+        "A Minari data set does not store its frame rate; 20 Hz is assumed, set --fps to change "
+        "it.",
     )
     assert refusal(Path("squares/top-v1")).startswith("There is nothing at 'squares/top-v1'")
     monkeypatch.delenv("MINARI_DATASETS_PATH")
@@ -420,8 +424,8 @@ def test_videos_of_another_rate_are_matched_by_time(tmp_path: Path) -> None:
     source = open_source(tmp_path)
     assert source.fps == 10
     assert source.notes == (
-        f"1 videos of '{tmp_path}' have another rate (20) than most; they are read at 10 frames "
-        "per second.",
+        f"Not all videos of '{tmp_path}' have the same rate: 1 of 3 are at 20 Hz and are read at "
+        "10 Hz.",
     )
     demo = source.episodes[2]
     assert made.told(demo.clip("video").frames(range(demo.length))) == [(2, f) for f in range(6)]

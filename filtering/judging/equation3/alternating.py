@@ -1,33 +1,34 @@
-"""Equation 3 by concentration steps from many random starts (least trimmed squares' way).
+"""Equation 3 by concentration steps from many random starts, as in least trimmed squares.
 
-After FAST-LTS (Rousseeuw and Van Driessen 2006): each start trusts a few random demonstrations
-alone; two steps tell which starts are worth finishing.
+After FAST-LTS (Rousseeuw and Van Driessen 2006): each start trusts a few random demonstrations;
+after two steps only the best starts are continued.
 """
 
 import numpy as np
 
 from filtering.judging.equation3.problem import Problem
-from filtering.judging.equation3.solver import Array, Solution, Solver, concentrate, fill
+from filtering.judging.equation3.solver import Solver, SolverResult, concentrate, fill
+from teasim.common.arrays import Array
 
 STARTS = 50
 """Random starts."""
 DRAWN = 3
-"""Most demonstrations that a start trusts."""
+"""Largest number of demonstrations that a start trusts."""
 FINISHED = 5
-"""Starts that are finished."""
+"""Starts that are continued to the end."""
 FIRST_STEPS = 2
-"""Steps by which a start is judged."""
+"""Steps after which starts are compared."""
 
 
 class Alternating(Solver):
     """Solves equation 3 by alternation between w and lambda."""
 
     def __init__(self, seed: int = 0) -> None:
-        """Take the seed of the starts."""
+        """Keep the seed of the starts."""
         self.seed = seed
 
-    def solve_kinds(self, problem: Problem, sizes: Array, trusted: float) -> Solution:
-        """Solve for K different demonstrations, `sizes` (K,) of each."""
+    def solve_distinct(self, problem: Problem, sizes: Array, trusted: float) -> SolverResult:
+        """Solve for K different demonstrations with `sizes` (K,) copies of each."""
         rng = np.random.default_rng(self.seed)
         solved, ends = 0, []
         for _ in range(STARTS):
@@ -46,4 +47,4 @@ class Alternating(Solver):
             finished.append((problem.objective(multipliers, weights), multipliers, weights))
         _, multipliers, weights = min(finished, key=lambda end: end[0])
         done = np.array_equal(fill(problem.demo_losses(multipliers), sizes, trusted), weights)
-        return Solution(multipliers, weights, done, solved)
+        return SolverResult(multipliers, weights, done, solved)

@@ -1,59 +1,60 @@
-"""Equation 3 along one path of falling temperature, the default solver.
+"""Equation 3 by deterministic annealing, the default solver.
 
 It adds the entropy term tau * sum_d [w log w + (1 - w) log(1 - w)]. For fixed lambda the optimal
-weights are then w_d = sigmoid((nu - l_d) / tau) with nu from sum w = M. tau goes from large (all
-demonstrations count alike) to small (the M most consistent ones count): one smooth path that starts
-at the whole pool's majority, where the plain problem has many local optima. The end of the path is
-hardened: the value is concave in w, so its least lies where all weights but one are 0 or 1.
+weights are then w_d = sigmoid((nu - l_d) / tau) with nu from sum w = M. tau falls from a large
+value (all demonstrations have equal weights) to a small one (the M most consistent ones are
+trusted). This smooth path starts at the majority of the whole pool, whereas the problem without
+entropy has many local optima. The end of the path is rounded: the value is concave in w, so its
+minimum is where all weights but one are 0 or 1.
 
-In a small pool without a clear majority the path may end beside the optimum. There the models of
-all pairs of demonstrations are starts as well, and the best end is improved by exchanges.
+In a small pool without a clear majority the path may miss the optimum. Then the models of all pairs
+of demonstrations are used as further starts, and the best solution is improved by exchanges.
 """
 
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import expit
 
 from filtering.judging.equation3.problem import Multipliers, Problem
 from filtering.judging.equation3.solver import (
     LEAST_GAIN,
-    Array,
-    Solution,
     Solver,
+    SolverResult,
     concentrate,
     fill,
     thinned,
 )
+from teasim.common.arrays import Array
+from teasim.common.trimming import soft_trim
 
 TAU_FIRST = 1.0
-"""First temperature [nats per step]: well above the spread of the losses, w is nearly uniform."""
+"""First temperature [nats per step]: well above the spread of the losses, so that w is
+nearly uniform."""
 TAU_LAST = 0.02
-"""Last temperature [nats per step]: well below what one defect adds to a demonstration's mean."""
+"""Last temperature [nats per step]: well below what one mistake adds to a mean loss."""
 TAU_COUNT = 16
 """Number of temperatures, geometrically spaced."""
 INNER_STEPS = 20
-"""Most alternations between lambda and w at one temperature."""
+"""Largest number of alternations between lambda and w at one temperature."""
 WEIGHT_TOLERANCE = 1e-3
 """Largest change of a weight at which a temperature counts as solved."""
 MOST_FOR_SEARCH = 32
-"""With so few different demonstrations, pairs are starts too and exchanges are tried at the end."""
+"""Largest number of different demonstrations for which pairs and exchanges are tried."""
 PAIRS = 8
-"""Pairs that are finished: those whose model fits its M best demonstrations best."""
+"""Pairs that are refined: those whose models fit M demonstrations best."""
 PAIR_PRECISION = 1e-2
-"""How precisely lambda is solved for to compare pairs."""
+"""Relative precision of lambda when pairs are compared."""
 MOST_FOR_PATH = 500
-"""The path is walked with at most so many different demonstrations."""
+"""Largest number of different demonstrations on the path."""
 PATH_PRECISION = 1e-7
-"""How precisely lambda is solved for on the way; the end is solved to the full."""
+"""Relative precision of lambda on the path; the end is solved to full precision."""
 
 
 class Annealed(Solver):
-    """Solves equation 3 along one path of falling temperature."""
+    """Solves equation 3 by deterministic annealing."""
 
-    def solve_kinds(self, problem: Problem, sizes: Array, trusted: float) -> Solution:
-        """Solve for K different demonstrations, `sizes` (K,) of each."""
+    def solve_distinct(self, problem: Problem, sizes: Array, trusted: float) -> SolverResult:
+        """Solve for K different demonstrations with `sizes` (K,) copies of each."""
         multipliers, solved = _walk(problem, sizes, trusted)
         small = len(sizes) <= MOST_FOR_SEARCH
         starts, tried = _pairs(problem, sizes, trusted) if small else ([], 0)
@@ -66,13 +67,13 @@ class Annealed(Solver):
         if small:
             multipliers, weights, steps = _swap(problem, sizes, trusted, multipliers, weights)
             solved += steps
-        return Solution(multipliers, weights, True, solved + tried)
+        return SolverResult(multipliers, weights, True, solved + tried)
 
 
 def _walk(problem: Problem, sizes: Array, trusted: float) -> tuple[Multipliers, int]:
     """Return lambda at the end of the path, and how often it was solved for.
 
-    In a large pool some demonstrations, evenly spread over what they do, show the way as well.
+    In a large pool a subset of the demonstrations, evenly spread over their contents, is used.
     """
     some = thinned(len(sizes), MOST_FOR_PATH)
     if len(some) < len(sizes):
@@ -83,7 +84,7 @@ def _walk(problem: Problem, sizes: Array, trusted: float) -> tuple[Multipliers, 
     solved = 1
     for tau in np.geomspace(TAU_FIRST, TAU_LAST, TAU_COUNT):
         multipliers, weights, steps = _settle(
-            problem, sizes, trusted, float(tau), multipliers, weights
+            problem, sizes, trusted, multipliers, weights, tau=float(tau)
         )
         solved += steps
     return multipliers, solved
@@ -93,13 +94,14 @@ def _settle(
     problem: Problem,
     sizes: Array,
     trusted: float,
-    tau: float,
     multipliers: Multipliers,
     weights: Array,
+    *,
+    tau: float,
 ) -> tuple[Multipliers, Array, int]:
-    """Alternate between w and lambda at one temperature until w stands still."""
+    """Alternate between w and lambda at one temperature until w is constant."""
     for step in range(1, INNER_STEPS + 1):  # noqa: B007
-        update = trust(problem.demo_losses(multipliers), sizes, trusted, tau)
+        update = sizes * soft_trim(problem.demo_losses(multipliers), sizes, trusted, tau)
         change = (np.abs(update - weights) / sizes).max()
         weights = update
         multipliers = problem.solve(weights, multipliers, PATH_PRECISION)
@@ -109,7 +111,7 @@ def _settle(
 
 
 def _pairs(problem: Problem, sizes: Array, trusted: float) -> tuple[list[Multipliers], int]:
-    """Return lambda of the most promising pairs of demonstrations, and how many pairs there are."""
+    """Return lambda of the best pairs of demonstrations, and the number of all pairs."""
     ends = []
     for pair in combinations(range(len(sizes)), 2):
         chosen = np.zeros(len(sizes))
@@ -124,7 +126,7 @@ def _pairs(problem: Problem, sizes: Array, trusted: float) -> tuple[list[Multipl
 def _swap(
     problem: Problem, sizes: Array, trusted: float, multipliers: Multipliers, weights: Array
 ) -> tuple[Multipliers, Array, int]:
-    """Exchange one trusted demonstration for another while that lowers the value."""
+    """Exchange one trusted demonstration for another while this lowers the value."""
     value, solved, improved = problem.objective(multipliers, weights), 0, True
     while improved:
         improved = False
@@ -147,19 +149,7 @@ def _swap(
 
 
 def _exchanges(losses: Array, sizes: Array, weights: Array) -> list[tuple[int, int]]:
-    """Return who could be trusted less and who more in exchange, the most promising first."""
+    """Return pairs (less trusted, more trusted) that could be exchanged, the best ones first."""
     less, more = np.flatnonzero(weights > 0).tolist(), np.flatnonzero(weights < sizes).tolist()
     pairs = [(one, other) for one in less for other in more if one != other]
     return sorted(pairs, key=lambda pair: losses[pair[1]] - losses[pair[0]])
-
-
-def trust(losses: Array, sizes: Array, trusted: float, tau: float) -> Array:
-    """Return v (K,) = sizes * sigmoid((nu - losses) / tau), with nu such that sum v = M."""
-    reach = tau * (np.log(sizes.sum()) + 40.0)
-
-    def excess(nu: float) -> float:
-        return float(sizes @ expit((nu - losses) / tau) - trusted)
-
-    nu = brentq(excess, losses.min() - reach, losses.max() + reach, xtol=1e-14)
-    weights: Array = sizes * expit((nu - losses) / tau)
-    return weights

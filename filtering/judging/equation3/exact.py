@@ -1,16 +1,16 @@
-"""Equation 3 with a certificate: branch and bound over who is trusted, for about 20 demonstrations.
+"""Equation 3 with a certificate: branch and bound, for about 20 demonstrations.
 
 Let H(v) = min over lambda of sum_k v_k (l_k(lambda) + ridge/2 |lambda|^2), so that equation 3 is
-min H(v) / M. As a minimum of linear functions H is concave: its least over {0 <= v <= sizes,
-sum v = M} is at a corner, where all demonstrations but one are trusted fully or not at all. It is
-also H(c v) = c H(v), so H(v + u) >= H(v) + H(u).
+min H(v) / M. As a minimum of linear functions H is concave: its minimum over {0 <= v <= sizes,
+sum v = M} is at a corner, where all demonstrations but one are trusted fully or not at all. Also
+H(c v) = c H(v), so H(v + u) >= H(v) + H(u).
 
-A node of the tree trusts some demonstrations (v), leaves some out, and has to spend the rest r of M
-on the free ones. With u_k = H(v + r e_k) / r, concavity gives for every such way of spending
+A node of the tree trusts some demonstrations (v), excludes some, and has to distribute the rest r
+of M among the open ones. With u_k = H(v + r e_k) / r, concavity gives for every distribution x
 
     H(v + sum_k x_k e_k)  >=  sum_k (x_k / r) H(v + r e_k)  =  sum_k x_k u_k,
 
-whose least is found by taking the cheapest first: a lower bound on the whole branch.
+whose minimum is found by taking the smallest u_k first: a lower bound on the whole branch.
 """
 
 from dataclasses import dataclass
@@ -19,28 +19,29 @@ import numpy as np
 
 from filtering.judging.equation3.annealed import Annealed
 from filtering.judging.equation3.problem import Multipliers, Problem
-from filtering.judging.equation3.solver import Array, Solution, Solver, fill
+from filtering.judging.equation3.solver import Solver, SolverResult, fill
+from teasim.common.arrays import Array
 from teasim.common.errors import ConfigError
 
 MOST = 24
-"""Most different demonstrations; each one more may double the work."""
+"""Largest number of different demonstrations; each further one may double the work."""
 TOLERANCE = 1e-6
-"""How much the value may lie above the lower bound, if nothing else is asked [nats per step]."""
+"""Default of the largest gap between the value and the lower bound [nats per step]."""
 PRECISION = 1e-3
-"""How precisely lambda is solved for, as a share of the tolerance; the bound allows for it."""
+"""Precision of lambda as a share of the tolerance; the bound allows for it."""
 NOTHING = 1e-9
-"""Weights below this are the dust of floating-point sums."""
+"""Weights below this are rounding errors."""
 
 
 class Exact(Solver):
-    """Solves equation 3 for good; `lower_bound_` says how well."""
+    """Solves equation 3 globally; `lower_bound_` certifies the value."""
 
     def __init__(self, tolerance: float = TOLERANCE) -> None:
-        """Take how much the value may lie above the lower bound [nats per step]."""
+        """Keep the largest gap between the value and the lower bound [nats per step]."""
         self.tolerance = tolerance
 
-    def solve_kinds(self, problem: Problem, sizes: Array, trusted: float) -> Solution:
-        """Solve for K different demonstrations, `sizes` (K,) of each."""
+    def solve_distinct(self, problem: Problem, sizes: Array, trusted: float) -> SolverResult:
+        """Solve for K different demonstrations with `sizes` (K,) copies of each."""
         if len(sizes) > MOST:
             raise ConfigError(
                 f"The pool has {len(sizes)} different demonstrations, and the solver 'exact' takes "
@@ -51,43 +52,43 @@ class Exact(Solver):
 
 @dataclass(frozen=True)
 class _Node:
-    """A branch: who is trusted is decided for some, open for the rest."""
+    """A branch: some demonstrations are decided, the others are open."""
 
     trusted: Array
-    """(K,) how much is trusted already, 0 for open ones."""
+    """(K,) trust already assigned, 0 for open ones."""
     open: tuple[int, ...]
-    """Not decided yet, the likeliest first."""
+    """Open demonstrations, those of least loss first."""
     partial: int | None
-    """The one that may be trusted in part."""
+    """The demonstration that may be trusted in part; None if it is not chosen yet."""
     costs: Array
-    """(K,) u_k; inf where k may not be trusted."""
+    """(K,) u_k, inf where k may not be trusted."""
     start: Multipliers
-    """lambda of a solution nearby."""
+    """lambda of a nearby solution."""
 
 
 class _Search:
-    """One search; the best solution so far is kept."""
+    """One search; keeps the best solution so far."""
 
     def __init__(self, problem: Problem, sizes: Array, trusted: float, tolerance: float) -> None:
         self.problem, self.sizes, self.total = problem, sizes, trusted
         self.tolerance = tolerance
-        found = Annealed().solve_kinds(problem, sizes, trusted)
+        found = Annealed().solve_distinct(problem, sizes, trusted)
         self.solved = found.n_iter
         self.multipliers, self.weights = found.multipliers, found.weights
         self.best, self.bound = self._value(found.weights, found.multipliers)[:2]
-        # Parts arise only where equal demonstrations, or a fraction of one, have to be shared out.
+        # Partial trust occurs only for groups of equal demonstrations, or when M is not whole.
         self.divisible = sizes > (1.0 if trusted.is_integer() else 0.0)
 
-    def run(self) -> Solution:
+    def run(self) -> SolverResult:
         likely = np.argsort(self.problem.demo_losses(self.multipliers), kind="stable")
         self._visit(np.zeros(len(self.sizes)), tuple(likely.tolist()), None, self.multipliers)
         bound = self.bound / self.total
-        return Solution(self.multipliers, self.weights, True, self.solved, bound)
+        return SolverResult(self.multipliers, self.weights, True, self.solved, bound)
 
     def _visit(
         self, trusted: Array, still_open: tuple[int, ...], partial: int | None, start: Multipliers
     ) -> None:
-        """Search a branch, if it can hold anything better."""
+        """Search a branch if it can contain a better solution."""
         rest = self.total - trusted.sum()
         if rest <= NOTHING:
             if partial is None:
@@ -106,7 +107,7 @@ class _Search:
         self._expand(_Node(trusted, still_open, partial, costs, nearby))
 
     def _expand(self, node: _Node) -> None:
-        """Decide one after the other: trusted, trusted in part, or, going on, left out."""
+        """Decide open ones in turn: trusted, trusted in part, or else excluded."""
         still_open, rest = node.open, self.total - node.trusted.sum()
         while still_open and not self._hopeless(node, still_open, rest, None):
             first, still_open = still_open[0], still_open[1:]
@@ -123,7 +124,7 @@ class _Search:
     def _hopeless(
         self, node: _Node, still_open: tuple[int, ...], rest: float, first: int | None
     ) -> bool:
-        """Tell that spending `rest`, after `first` was trusted, leads to nothing better."""
+        """Return whether distributing `rest`, with `first` trusted, cannot improve the value."""
         candidates = list(still_open) if node.partial is None else [node.partial, *still_open]
         if self.sizes[candidates].sum() < rest - NOTHING:
             return True
@@ -137,18 +138,18 @@ class _Search:
         return True
 
     def _compare(self, weights: Array, start: Multipliers) -> None:
-        """Look at a corner."""
+        """Evaluate a corner and keep it if it is the best one."""
         value, bound, multipliers = self._value(weights, start)
         self.bound = min(self.bound, bound)
         if value < self.best:
             self.best, self.multipliers, self.weights = value, multipliers, weights
 
     def _value(self, weights: Array, start: Multipliers) -> tuple[float, float, Multipliers]:
-        """Return H(v), a number that it is not below, and lambda."""
+        """Return H(v), a lower bound on it, and lambda."""
         self.solved += 1
         multipliers = self.problem.solve(weights, start, PRECISION * self.tolerance)
         value, slope = self.problem.value_and_slope(multipliers, weights)
-        # A function whose curvature is at least the ridge is nowhere lower than this.
+        # A lower bound for a function whose curvature is at least the ridge.
         least = value - float(np.sum(slope**2)) / (2 * self.problem.ridge)
         return value * weights.sum(), least * weights.sum(), multipliers
 

@@ -1,12 +1,12 @@
-"""Equation 3 of the paper: weighted maximum-entropy model of the next sub-task, and its gradient.
+"""Equation 3 of the paper: a weighted maximum-entropy model of the next sub-task.
 
 With one block of multipliers per next sub-task, f_i(s, t) is the state in the block of t, and
 
     l_d(lambda) = sum_s p(s|d) log z_lambda(s) - sum_i lambda_i sum_{s,t} p(s,t|d) f_i(s,t)
     (3)  min over lambda, w of  (1/M) sum_d w_d l_d(lambda)   s.t.  sum_d w_d = M, 0 <= w_d <= 1
 
-is demonstration d's mean negative log-likelihood per step. A ridge on lambda is added (feature
-matching is relaxed): without it a separable pool lets lambda diverge and leaves w arbitrary.
+is the mean negative log-likelihood per step of demonstration d. A ridge on lambda is added, which
+relaxes feature matching: without it lambda diverges in a separable pool and w is arbitrary.
 """
 
 from dataclasses import dataclass
@@ -22,15 +22,16 @@ Multipliers = NDArray[np.float64]
 """(N, T + 1) lambda: one column per next sub-task, the last one for END."""
 
 MOST_FOR_NEWTON = 200
-"""Up to so many multipliers, Newton's method is faster than L-BFGS."""
+"""Number of multipliers up to which Newton's method is faster than L-BFGS."""
 NEWTON_STEPS = 100
+"""Largest number of Newton steps."""
 SHORTEST_STEP = 1e-6
-"""A Newton step is halved at most until this share of it."""
+"""Share of a Newton step down to which it is halved."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """The inner problem of equation 3: everything but the weights."""
+    """The inner problem of equation 3: all but the weights."""
 
     rows: Transitions
     """State and next sub-task of every step in the pool."""
@@ -44,7 +45,7 @@ class Problem:
 
     def log_probabilities(self, multipliers: Multipliers) -> NDArray[np.float64]:
         """Return log p_lambda(t|s), (R, T + 1)."""
-        # Labels first: sums over few labels are fast along the first axis only.
+        # Labels first: sums over a few labels are fast along the first axis only.
         scores = multipliers.T @ self.rows.states.T
         scores -= scores.max(axis=0)
         scores -= np.log(np.exp(scores).sum(axis=0))
@@ -78,7 +79,7 @@ class Problem:
     def value_and_slope(
         self, multipliers: Multipliers, weights: NDArray[np.float64]
     ) -> tuple[float, Multipliers]:
-        """Return the objective and its gradient (N, T + 1), at the price of one."""
+        """Return the objective and its gradient (N, T + 1)."""
         shares = self.row_weights(weights)
         everyone = np.arange(len(shares))
         log_p = self.log_probabilities(multipliers)
@@ -121,8 +122,8 @@ class Problem:
 
         Args:
             weights: (D,) of any positive sum.
-            start: where to begin; zeros if not given.
-            precision: relative improvement of the objective below which it is good enough.
+            start: first lambda; None means zeros.
+            precision: relative improvement of the objective at which it stops.
         """
         shape = self.shape
         # Rows of demonstrations without weight change nothing and need no look.
@@ -149,7 +150,7 @@ class Problem:
     def _newton(
         self, multipliers: Multipliers, weights: NDArray[np.float64], precision: float
     ) -> Multipliers:
-        """Take Newton steps, each halved until it improves enough."""
+        """Take Newton steps, each halved until it improves the value enough (Armijo)."""
         value, slope = self.value_and_slope(multipliers, weights)
         for _ in range(NEWTON_STEPS):
             step = cho_solve(cho_factor(self.curvature(multipliers, weights)), slope.ravel())
@@ -167,7 +168,7 @@ class Problem:
         return multipliers
 
     def only(self, demos: NDArray[np.bool_] | NDArray[np.int64]) -> "Problem":
-        """Return the problem of some demonstrations: a mask (D,), or numbers in that order."""
+        """Return the problem of some demonstrations, given by a mask (D,) or by ordered numbers."""
         numbers = np.flatnonzero(demos) if demos.dtype == bool else demos
         counts = self.steps_per_demo()
         starts = np.cumsum(counts) - counts

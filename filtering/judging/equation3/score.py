@@ -1,25 +1,25 @@
-"""How surprising each demonstration is to a model fitted without it.
+"""Surprise of each demonstration under a model fitted without it.
 
-The weights of equation 3 always trust exactly M demonstrations, also in a clean pool, so they rank
-but do not decide. Each demonstration is therefore scored by surprises of two kinds, in nats:
+The weights of equation 3 always trust exactly M demonstrations, even in a clean pool, so they rank
+demonstrations but do not separate them. Each demonstration is therefore scored by surprises of two
+types, in nats:
 
 * step: log max_u p(u|s) - log p(t|s), how much less likely the step taken was than the likeliest
-  one, under equation 3 fitted to the others. 0 wherever the demonstration does the usual thing,
-  however long it is.
+  one, under equation 3 fitted to the other demonstrations. It is 0 for usual steps, at any length.
 * omission (not part of equation 3): max(0, log-odds that the others do the sub-task), for each
-  sub-task the demonstration never does. A conditional next-step model may find a left-out step
-  unsurprising where many orders are usual; counting who does it at all does not.
+  sub-task the demonstration lacks. A conditional next-step model may not be surprised by an
+  omission where many orders are usual; the frequency of the sub-task shows it.
 
-Of each kind the worst surprise counts in full, the next by half, and so on: one defect is never
-averaged away over the steps that went well. The sum of both kinds is the loss l_d, and
+Of each type the largest surprise counts in full, the next one by half, and so on: one mistake is
+not averaged away over the correct steps. The sum of both types is the loss l_d, and
 
     w_d = exp(-max(0, l_d - median l) / unit)
 
-the weight: 1 for whatever is no stranger than half of the pool. The unit is 1 nat, or more where
-the better half of the pool itself varies more (many legal orders). Because head count decides what
+is the weight: 1 for demonstrations no more surprising than the median. The unit is 1 nat, or more
+where the better half of the pool varies more (many legal orders). Because the majority defines what
 is usual, at least half of the pool must be consistent.
 
-All this is done twice: first with the weights of equation 3, then with the w_d above, so that all
+This is done twice: first with the weights of equation 3, then with the w_d above, so that all
 consistent demonstrations shape the final model and not only the M trusted ones.
 """
 
@@ -31,18 +31,18 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_softmax
 
 from filtering.judging.equation3.problem import Multipliers, Problem
-from filtering.judging.equation3.solver import Solver, kinds_of, thinned
+from filtering.judging.equation3.solver import Solver, distinct_demos, thinned
 
 DECAY = 0.5
-"""Share that each further surprise of a demonstration counts of the one before it."""
+"""Factor of each further surprise of a demonstration relative to the one before it."""
 SMALLEST_UNIT = 1.0
 """Loss above the median that takes a weight from 1 to 1/e in a pool without variety [nats]."""
 SPREADS_PER_UNIT = 2.0
-"""The same in a pool with variety [mean distance of the better half below the median]."""
+"""The same unit in a pool with variety [mean distance of the better half below the median]."""
 MOST_REFITS = 200
-"""With more different demonstrations than this, leaving one out is one Newton step."""
+"""Number of different demonstrations above which leaving one out is one Newton step."""
 MOST_FOR_CURVATURE = 1000
-"""The curvature for that step is taken from at most so many demonstrations, evenly spread."""
+"""Largest number of demonstrations, evenly spaced, that give the curvature for that step."""
 SMOOTHING = 0.5
 """Pseudo-count on both sides of the omission log-odds [demonstrations]."""
 
@@ -62,7 +62,7 @@ class Score:
 
     @property
     def weights(self) -> NDArray[np.float64]:
-        """(D,) w_d in (0, 1]: 1 for a usual demonstration, towards 0 for a strange one."""
+        """(D,) w_d in (0, 1]: 1 for a usual demonstration, towards 0 for an unusual one."""
         return graded(self.losses)
 
 
@@ -97,14 +97,14 @@ def leave_one_out(
     Returns:
         (R, T + 1) natural logarithms.
     """
-    kinds, firsts = kinds_of(problem)
+    numbers, firsts = distinct_demos(problem)
     if len(firsts) > MOST_REFITS:
         return _one_step(problem, weights, multipliers)
     rows = problem.rows
     log_p = np.zeros((len(rows.demos), rows.n_subtasks + 1))
-    for kind, demo in enumerate(firsts.tolist()):
+    for number, demo in enumerate(firsts.tolist()):
         refitted = problem.solve(_without(weights, demo), multipliers)
-        mine = kinds[rows.demos] == kind
+        mine = numbers[rows.demos] == number
         log_p[mine] = log_softmax(rows.states[mine] @ refitted, axis=1)
     return log_p
 
@@ -112,11 +112,11 @@ def leave_one_out(
 def _one_step(
     problem: Problem, weights: NDArray[np.float64], multipliers: Multipliers
 ) -> NDArray[np.float64]:
-    """Return the same after one Newton step per demonstration, from the model of all.
+    """Approximate `leave_one_out` by one Newton step per demonstration from the model of all.
 
-    In a large pool one demonstration less moves lambda little. Where the gradient over all
+    In a large pool, removing one demonstration changes lambda little. Where the gradient over all
     vanishes, that over the others is -(w_d / (W - w_d)) (grad l_d + ridge lambda), W = sum w, and
-    their curvature is nearly that of all.
+    their curvature is close to that of all.
     """
     rows = problem.rows
     some = thinned(rows.n_demos, MOST_FOR_CURVATURE)
@@ -168,7 +168,7 @@ def worst_first(surprises: NDArray[np.float64]) -> float:
 def _without(weights: NDArray[np.float64], demo: int) -> NDArray[np.float64]:
     others = weights.copy()
     others[demo] = 0.0
-    # A pool in which nobody else is trusted has no opinion: every other demonstration counts alike.
+    # If no other demonstration is trusted, all others count equally.
     if others.sum() < 1e-9:
         others = np.where(np.arange(len(weights)) == demo, 0.0, 1.0)
     return others

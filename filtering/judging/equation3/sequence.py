@@ -2,8 +2,8 @@
 
 A demonstration of q segments gives q + 1 rows. Row 0 is the state before anything was done (START)
 and asks for the first sub-task; row k is the state after segment k and asks for the sub-task that
-follows; the last row asks for END. Predicting the *next* label makes an omission visible: with a
-segment's own label as the target, a left-out step leaves no trace.
+follows; the last row asks for END. Predicting the *next* label makes an omission visible: with the
+label of the segment itself as the target, an omitted step leaves no trace.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 HISTORY_SCALE = 1.0
 """Length of a finished sub-task's entry in the history block [relative to a segment's feature].
 
-At 1 the ridge holds both back alike: what is in view decides, and history where the view leaves a
-choice (turning the oven on and off look the same)."""
+At 1 the ridge penalises both equally: the view decides, and history decides where views are alike
+(turning the oven on and off)."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ def state_rows(
 ) -> NDArray[np.float64]:
     """Return (q + 1, 2 + N + T): bias, START, current segment's features, history.
 
-    The history block says which sub-tasks are done. It tells "tea bag after milk because it was not
-    in yet" (another order) from "oven off after milk although no tea bag is in" (an omission).
-    Neither block ever depends on the label that is to be predicted.
+    The history block says which sub-tasks are done. It separates "tea bag after milk because it was
+    not in yet" (another order) from "oven off after milk although no tea bag is in" (an omission).
+    No block depends on the label that is to be predicted.
     """
     history = HISTORY_SCALE * done_so_far(labels, n_subtasks)
     start = np.zeros((len(labels) + 1, 1))

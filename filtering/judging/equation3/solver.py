@@ -1,9 +1,9 @@
-"""What every solver of equation 3 over (lambda, w) has in common.
+"""The interface of all solvers of equation 3 over (lambda, w), and what they share.
 
-Demonstrations that are equal in every row are one demonstration that may weigh as much as they
-are: the value of equation 3 depends on their sum alone. So a solver is given the different ones, in
-an order of content, and how many there are of each. Two laws follow for all solvers, to the last
-bit: equal demonstrations get equal weights, and permuting demonstrations permutes the weights.
+The value of equation 3 depends only on the sum of the weights of demonstrations that are equal in
+every row. So a solver is given the different demonstrations, ordered by content, and the number of
+copies of each. Two properties then hold exactly for all solvers: equal demonstrations get equal
+weights, and permuting the demonstrations permutes the weights.
 """
 
 from abc import ABC, abstractmethod
@@ -14,30 +14,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.judging.equation3.problem import Multipliers, Problem
+from teasim.common.arrays import Array
 from teasim.common.errors import ConfigError
 
-Array = NDArray[np.float64]
-
 LEAST_GAIN = 1e-7
-"""Progress below this is none [nats per step]."""
+"""Improvement of the value below which iterations stop [nats per step]."""
 
 
 @dataclass(frozen=True)
-class Solution:
-    """A solution over K different demonstrations."""
+class SolverResult:
+    """The solution over K different demonstrations."""
 
     multipliers: Multipliers
     """(N, T + 1) lambda."""
     weights: Array
-    """(K,) v in [0, number of equal ones], sum v = M."""
+    """(K,) v in [0, number of copies], sum v = M."""
     converged: bool
-    """Whether the solver ended because it was done."""
+    """Whether the solver converged."""
     n_iter: int
-    """How often lambda was solved for."""
+    """Number of times that lambda was solved for."""
     lower_bound: float = -np.inf
-    """No solution has a lower value than this [nats per step]."""
+    """Lower bound on the value of every solution [nats per step]; -inf if there is none."""
     ridge: float | None = None
-    """Strength of the penalty that was solved with, if not the problem's."""
+    """Strength of the ridge that was used; None for that of the problem."""
 
 
 class Solver(ABC):
@@ -47,10 +46,10 @@ class Solver(ABC):
         weights_ (D,): w in [0, 1], sum M.
         multipliers_ (N, T + 1): lambda.
         losses_ (D,): l_d [nats per step].
-        objective_: value of equation 3 with the ridge that was solved with [nats per step].
-        lower_bound_: no solution has a lower value; -inf where the solver cannot say.
-        converged_: whether the solver ended because it was done.
-        n_iter_: how often lambda was solved for.
+        objective_: value of equation 3 with the ridge that was used [nats per step].
+        lower_bound_: lower bound on the value of every solution; -inf if the solver has none.
+        converged_: whether the solver converged.
+        n_iter_: number of times that lambda was solved for.
     """
 
     weights_: Array
@@ -62,11 +61,11 @@ class Solver(ABC):
     n_iter_: int
 
     def fit(self, problem: Problem, trusted: float) -> Self:
-        """Solve the problem, which is not modified.
+        """Solve the problem.
 
         Args:
             problem: states and next sub-tasks of D demonstrations.
-            trusted: M, how many demonstrations are trusted, 0 < M < D; it need not be whole.
+            trusted: M, number of trusted demonstrations, 0 < M < D; it need not be whole.
 
         Raises:
             ConfigError: M is out of range, or the problem is too large for the solver.
@@ -76,11 +75,11 @@ class Solver(ABC):
                 f"{trusted} trusted demonstrations were asked for; choose a number between 0 and "
                 f"{problem.rows.n_demos}."
             )
-        kinds, firsts = kinds_of(problem)
-        sizes = np.bincount(kinds).astype(np.float64)
-        found = self.solve_kinds(problem.only(firsts), sizes, float(trusted))
+        numbers, firsts = distinct_demos(problem)
+        sizes = np.bincount(numbers).astype(np.float64)
+        found = self.solve_distinct(problem.only(firsts), sizes, float(trusted))
         ridge = problem.ridge if found.ridge is None else found.ridge
-        self.weights_ = np.clip(found.weights / sizes, 0.0, 1.0)[kinds]
+        self.weights_ = np.clip(found.weights / sizes, 0.0, 1.0)[numbers]
         self.multipliers_ = found.multipliers
         self.losses_ = problem.demo_losses(found.multipliers)
         self.objective_ = Problem(problem.rows, ridge).objective(found.multipliers, self.weights_)
@@ -90,14 +89,14 @@ class Solver(ABC):
         return self
 
     @abstractmethod
-    def solve_kinds(self, problem: Problem, sizes: Array, trusted: float) -> Solution:
-        """Solve for K different demonstrations, `sizes` (K,) of each."""
+    def solve_distinct(self, problem: Problem, sizes: Array, trusted: float) -> SolverResult:
+        """Solve for K different demonstrations with `sizes` (K,) copies of each."""
 
 
-def kinds_of(problem: Problem) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return (D,) the kind of each demonstration, (K,) the first demonstration of each kind.
+def distinct_demos(problem: Problem) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return numbers (D,) of the K different demonstrations, and the first of each (K,).
 
-    Equal demonstrations are of one kind; kinds are numbered by content.
+    Equal demonstrations share a number; the different ones are ordered by content.
     """
     ends = np.cumsum(problem.steps_per_demo())
     states, nexts = problem.rows.states, problem.rows.nexts
@@ -105,14 +104,14 @@ def kinds_of(problem: Problem) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         (nexts[stop - count : stop].tobytes(), states[stop - count : stop].tobytes())
         for stop, count in zip(ends, problem.steps_per_demo(), strict=True)
     ]
-    number = {content: kind for kind, content in enumerate(sorted(set(contents)))}
-    kinds = np.array([number[content] for content in contents], dtype=np.int64)
-    firsts = np.unique(kinds, return_index=True)[1].astype(np.int64)
-    return kinds, firsts
+    rank = {content: number for number, content in enumerate(sorted(set(contents)))}
+    numbers = np.array([rank[content] for content in contents], dtype=np.int64)
+    firsts = np.unique(numbers, return_index=True)[1].astype(np.int64)
+    return numbers, firsts
 
 
 def fill(losses: Array, sizes: Array, trusted: float) -> Array:
-    """Return the v (K,) that minimises v @ losses: the least losses are trusted first."""
+    """Return the v (K,) of sum M that minimises v @ losses: the least losses are trusted first."""
     order = np.argsort(losses, kind="stable")
     before = np.cumsum(sizes[order]) - sizes[order]
     weights = np.empty_like(sizes)
@@ -123,10 +122,10 @@ def fill(losses: Array, sizes: Array, trusted: float) -> Array:
 def concentrate(
     problem: Problem, sizes: Array, trusted: float, multipliers: Multipliers, most: int = 100
 ) -> tuple[Multipliers, Array, int]:
-    """Alternate between the best w for lambda and the best lambda for w until w stands still.
+    """Alternate between the best w for lambda and the best lambda for w until w is constant.
 
-    Each step lowers the value (Rousseeuw and Van Driessen 2006 call it concentration), so it ends:
-    with the last change of w, or with a gain below LEAST_GAIN.
+    Each step lowers the value (a concentration step of Rousseeuw and Van Driessen 2006). It stops
+    when w no longer changes, when the gain is below LEAST_GAIN, or after `most` steps.
 
     Returns:
         lambda, v (K,), and the number of steps.
@@ -145,5 +144,5 @@ def concentrate(
 
 
 def thinned(count: int, most: int) -> NDArray[np.int64]:
-    """Return at most `most` of the numbers 0..count-1, evenly spread."""
+    """Return at most `most` of the numbers 0..count-1, evenly spaced."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))

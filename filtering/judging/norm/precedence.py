@@ -1,7 +1,7 @@
-"""What has to come before what, where somebody knows it: side knowledge beside the pool.
+"""A precedence graph: known rules of order, given beside the pool.
 
-A legal order that few choose and a wrong order look the same in a pool. A precedence graph decides:
-then only its violated pairs count as disorder, and how usual a next step is does not count at all.
+A rare legal order and a wrong order look alike in a pool. With a precedence graph only violated
+pairs of the graph count as disorder, and next steps do not count.
 """
 
 import json
@@ -10,25 +10,25 @@ from pathlib import Path
 
 import numpy as np
 
-from filtering.judging.norm.steps import Array
+from teasim.common.arrays import Array
 from teasim.common.errors import ConfigError
 
 Pairs = tuple[tuple[str, str], ...]
-"""Names of sub-tasks (a, b): a comes before b."""
+"""Names of sub-tasks (a, b): a has to come before b."""
 
 
 def read_precedence(path: Path | str) -> Pairs:
-    """Read lines "a before b" (# begins a comment), or a JSON list of pairs [a, b].
+    """Read a file of lines "a before b" (# begins a comment), or a JSON list of pairs [a, b].
 
     Raises:
-        ConfigError: the file cannot be read, or says something else.
+        ConfigError: the file cannot be read, is empty, or contains something else.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"'{path}' cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
-        raise ConfigError(f"'{path}' is no text.") from error
+        raise ConfigError(f"'{path}' is not a text file.") from error
     pairs = _from_json(path, text) if text.lstrip().startswith("[") else _from_lines(path, text)
     if not pairs:
         raise ConfigError(f"'{path}' is empty; it needs lines 'a before b'.")
@@ -36,10 +36,10 @@ def read_precedence(path: Path | str) -> Pairs:
 
 
 def precedence_graph(pairs: Pairs, subtasks: Sequence[str]) -> Array:
-    """Return (T, T): 1 where a has to come before b, also by way of others.
+    """Return (T, T): 1 where a has to come before b, directly or through other sub-tasks.
 
     Raises:
-        ConfigError: a pair names no sub-task of the pool, or the pairs run in a circle.
+        ConfigError: a pair names an unknown sub-task, or the pairs form a cycle.
     """
     numbers = {name: number for number, name in enumerate(subtasks)}
     graph = np.zeros((len(subtasks), len(subtasks)), dtype=bool)
@@ -47,29 +47,29 @@ def precedence_graph(pairs: Pairs, subtasks: Sequence[str]) -> Array:
         for name in pair:
             if name not in numbers:
                 raise ConfigError(
-                    f"The precedence names '{name}', which is none of the pool's sub-tasks "
+                    f"The precedence names the unknown sub-task '{name}'; the pool has "
                     f"{', '.join(subtasks)}."
                 )
         graph[numbers[pair[0]], numbers[pair[1]]] = True
     for via in range(len(subtasks)):
         graph |= graph[:, via, None] & graph[None, via, :]
-    circle = np.flatnonzero(graph.diagonal())
-    if len(circle):
+    cycle = np.flatnonzero(graph.diagonal())
+    if len(cycle):
         raise ConfigError(
-            f"The precedence runs in a circle: '{subtasks[circle[0]]}' would come before itself."
+            f"The precedence has a cycle: '{subtasks[cycle[0]]}' would have to come before itself."
         )
     return graph.astype(np.float64)
 
 
 def _from_lines(path: Path | str, text: str) -> Pairs:
     pairs = []
-    for place, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.splitlines(), start=1):
         words = line.split("#")[0].strip()
         if not words:
             continue
         first, between, second = words.partition(" before ")
         if not between or not first.strip() or not second.strip():
-            raise ConfigError(f"Line {place} of '{path}' is '{line}'; write 'a before b'.")
+            raise ConfigError(f"Line {number} of '{path}' is '{line}'; write 'a before b'.")
         pairs.append((first.strip(), second.strip()))
     return tuple(pairs)
 
@@ -78,7 +78,7 @@ def _from_json(path: Path | str, text: str) -> Pairs:
     try:
         entries = json.loads(text)
     except ValueError as error:
-        raise ConfigError(f"'{path}' is no JSON: {error}.") from error
+        raise ConfigError(f"'{path}' is not valid JSON: {error}.") from error
     for entry in entries:
         strings = isinstance(entry, list) and all(isinstance(name, str) for name in entry)
         if not strings or len(entry) != 2:

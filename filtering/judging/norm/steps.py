@@ -1,7 +1,6 @@
-"""What the step lists of a pool have in common, counted: occurrence, precedence, next steps.
+"""Counts of step lists: occurrence, precedence and next steps.
 
-The default score asks three questions of every demonstration: which sub-tasks it does at all, which
-of two comes first, and what follows what. Here they become three arrays; nothing is fitted yet.
+They are what the default score is computed from; nothing is fitted here.
 """
 
 from collections.abc import Sequence
@@ -10,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from teasim.common.arrays import Array
 from teasim.pool.types import runs
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -22,7 +20,7 @@ class StepList:
     labels: tuple[int, ...]
     """(q,) sub-task of each segment, 0..T-1."""
     lengths: tuple[int, ...]
-    """(q,) frames of each segment; what a short spurious segment says counts little."""
+    """(q,) frames of each segment; a short, possibly spurious segment has little influence."""
 
     def __post_init__(self) -> None:
         if len(self.labels) != len(self.lengths):
@@ -32,7 +30,7 @@ class StepList:
 
 
 def steps_of_frames(labels: NDArray[np.int64]) -> StepList:
-    """Return the runs of equal labels (n,); negative ones are background and join what is around.
+    """Return the runs of equal labels (n,); negative labels are background and are skipped.
 
     Raises:
         ValueError: every frame is background.
@@ -51,14 +49,14 @@ class StepCounts:
     occurs: Array
     """(D, T) x_da: 1 where a sub-task occurs."""
     before: Array
-    """(D, T, T) q_dab: share of the pairs of an a-frame and a b-frame in which a is first; 0 where
-    the demonstration has not both."""
+    """(D, T, T) q_dab, share of the pairs of an a-frame and a b-frame in which a is first; 0 where
+    the demonstration lacks one of them."""
     both: Array
-    """(D, T, T) 1 where the demonstration has a and b, and a is not b."""
+    """(D, T, T) 1 where a and b both occur and differ."""
     follows: Array
-    """(D, T + 1, T + 1) B_dst: how often t comes right after s."""
+    """(D, T + 1, T + 1) B_dst, how often t follows s directly."""
     binding: Array
-    """(T, T) 1 where a before b may be asked for, 0 where nobody minds."""
+    """(T, T) 1 where the order of a and b may count, 0 where it does not."""
 
     @property
     def n_demos(self) -> int:
@@ -71,7 +69,7 @@ class StepCounts:
         return self.occurs.shape[1]
 
     def restricted(self, graph: Array) -> "StepCounts":
-        """Return the same where only `graph` (T, T), 1 for a before b, is known of order."""
+        """Return counts in which only the order of `graph` (T, T), 1 for a before b, matters."""
         related = np.maximum(graph, graph.T)
         return StepCounts(
             self.occurs,
@@ -83,11 +81,11 @@ class StepCounts:
 
 
 def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
-    """Count what D demonstrations do.
+    """Count occurrence, precedence and next steps of D demonstrations.
 
     Args:
-        demos: the step lists.
-        n_subtasks: T, one more than the largest label that may occur.
+        demos: D step lists.
+        n_subtasks: T, number of labels that may occur.
     """
     shape = (len(demos), n_subtasks, n_subtasks)
     owners = np.repeat(np.arange(len(demos)), [len(demo.labels) for demo in demos])
@@ -104,12 +102,12 @@ def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
 def _precedence(
     owners: NDArray[np.int64], labels: NDArray[np.int64], lengths: Array, shape: tuple[int, int]
 ) -> Array:
-    """Return (D, T, T): share of frame pairs with the row's sub-task before the column's."""
+    """Return (D, T, T): share of frame pairs with the sub-task of the row before the column."""
     frames = np.zeros((len(labels), shape[1]))
     frames[np.arange(len(labels)), labels] = lengths
     total = np.zeros(shape)
     np.add.at(total, (owners, labels), lengths)
-    # Frames of each sub-task before a segment: in the whole pool, less those in earlier ones.
+    # Frames of each sub-task before a segment: those of the pool minus those of earlier demos.
     earlier = np.cumsum(frames, axis=0) - frames - (np.cumsum(total, axis=0) - total)[owners]
     pairs = np.zeros((*shape, shape[1]))
     np.add.at(pairs.transpose(0, 2, 1), (owners, labels), earlier * lengths[:, None])
@@ -118,7 +116,7 @@ def _precedence(
 
 
 def _transitions(demos: Sequence[StepList], n_subtasks: int) -> Array:
-    """Return (D, T + 1, T + 1): how often the column's sub-task comes right after the row's."""
+    """Return (D, T + 1, T + 1): how often the sub-task of the column follows that of the row."""
     follows = np.zeros((len(demos), n_subtasks + 1, n_subtasks + 1))
     owners = np.repeat(np.arange(len(demos)), [len(demo.labels) + 1 for demo in demos])
     sources = np.array([label for demo in demos for label in (n_subtasks, *demo.labels)])

@@ -43,8 +43,8 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
         ()
         if options.fps
         else (
-            f"ALOHA episodes do not store their frame rate; {DEFAULT_FPS:g} per second are "
-            "assumed, --fps says otherwise.",
+            f"ALOHA episodes do not store their frame rate; {DEFAULT_FPS:g} Hz is assumed, "
+            "set --fps to change it.",
         )
     )
     fps = options.fps or DEFAULT_FPS

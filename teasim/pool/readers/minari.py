@@ -76,8 +76,8 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
         ()
         if fps
         else (
-            f"A Minari data set does not store its frame rate; {DEFAULT_FPS:g} per second are "
-            "assumed, --fps says otherwise.",
+            f"A Minari data set does not store its frame rate; {DEFAULT_FPS:g} Hz is assumed, "
+            "set --fps to change it.",
         )
     )
     return RecordedSource(

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool.hub import missing
+from teasim.pool import hub
 from teasim.pool.readers import aloha, lerobot, minari, ms_tcn, robomimic, videos
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.source import Source
@@ -24,31 +24,30 @@ def open_source(path: Path | str, options: ReadOptions | None = None) -> Source:
 
     Args:
         path: a folder or file, or the name of a data set in the local cache of the Hugging Face
-            Hub (`teasim.pool.hub`).
+            Hub (`teasim.pool.hub`) or of Minari.
         options: what the format does not store; None means nothing was said.
 
     Raises:
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it, or it is damaged.
     """
-    place, options = found_by_reader(path), options or ReadOptions()
+    place, options = located(path), options or ReadOptions()
     reader = reader_of(place)
     for name in options.given():
         if name not in reader.options:
             raise ConfigError(
-                f"'{place}' is read as {reader.name}, which has no use for {name}; leave it out."
+                f"The option {name} does not apply to '{place}' ({reader.name}); leave it out."
             )
     return reader.open(place, options)
 
 
-def found_by_reader(path: Path | str) -> Path:
-    """Return the path itself, or where a reader finds a data set of that name."""
-    if not Path(path).exists():
-        for reader in READERS:
-            place = reader.find(str(path)) if reader.find else None
-            if place is not None:
-                return place
-    return Path(path)
+def located(path: Path | str) -> Path:
+    """Return the path itself, or where the local copy of the data set of that name is stored."""
+    copy = hub.located(path)
+    if copy.exists():
+        return copy
+    found = (reader.find(str(path)) for reader in READERS if reader.find is not None)
+    return next((place for place in found if place is not None), copy)
 
 
 def check_source(path: Path | str, options: ReadOptions | None = None) -> list[str]:
@@ -61,7 +60,7 @@ def check_source(path: Path | str, options: ReadOptions | None = None) -> list[s
         ConfigError: an option does not fit the format.
         PoolError: no reader recognises it.
     """
-    place = found_by_reader(path)
+    place = located(path)
     reader = reader_of(place)
     if reader.check is not None:
         return reader.check(place)
@@ -77,9 +76,9 @@ def reader_of(path: Path) -> Reader:
     Raises:
         PoolError: there is nothing at `path`, or no reader recognises it.
     """
-    path = found_by_reader(path)
+    path = located(path)
     if not path.exists():
-        raise PoolError(missing(path))
+        raise PoolError(hub.missing(path))
     for reader in READERS:
         if reader.recognises(path):
             return reader

@@ -169,7 +169,7 @@ def _mask_notes(path: Path, file: Any) -> list[str]:
     ]
     if not masks:
         return []
-    return [f"'{path.name}' has masks, with --mask NAME only one is read: {', '.join(masks)}."]
+    return [f"'{path.name}' has masks, of which --mask NAME reads one: {', '.join(masks)}."]
 
 
 def _masked(path: Path, file: Any, mask: str, names: Sequence[str]) -> list[str]:
@@ -196,8 +196,8 @@ def _rate(path: Path, data: Any, options: ReadOptions) -> tuple[float, list[str]
     if options.fps is not None:
         return options.fps, []
     return DEFAULT_FPS, [
-        f"'{path.name}' does not store its frame rate; {DEFAULT_FPS:g} per second are assumed, "
-        "--fps says otherwise."
+        f"'{path.name}' does not store its frame rate; {DEFAULT_FPS:g} Hz is assumed, set --fps to "
+        "change it."
     ]
 
 
@@ -224,8 +224,9 @@ def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:
     if not keep:
         return [f"robomimic: leave these names out of the mask you train on: {names}"]
     code = (
-        f'import h5py; h5py.File({json.dumps(str(root))}, "a")["mask/keep"] = '
-        f'[name.encode() for name in "{names}".split()]'
+        f'import h5py; file = h5py.File({json.dumps(str(root))}, "a"); '
+        f'file.pop("mask/keep", None); '
+        f'file["mask/keep"] = [name.encode() for name in "{names}".split()]'
     )
     return [
         f"robomimic: python -c {shlex.quote(code)}   (writes the mask keep into the file)",

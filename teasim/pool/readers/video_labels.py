@@ -93,7 +93,7 @@ def _write(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
 
 
 def _read(path: Path, kind: type[Row]) -> list[list[str]]:
-    """Return the cells of the rows of a table whose head is that of `kind`; none of any other file."""
+    """Return the rows of a table whose head is that of `kind`; none of another file."""
     columns = [field.name for field in fields(kind)]
     try:
         with path.open(encoding="utf-8", newline="") as stream:

@@ -20,7 +20,7 @@ from teasim.pool.readers.video_labels import (
     read_demonstrations,
     read_labels,
 )
-from teasim.pool.recordings import RecordedSource, Recording, unreadable
+from teasim.pool.recordings import RecordedSource, Recording, listed, unreadable
 from teasim.pool.types import Span
 
 SUFFIXES = frozenset(
@@ -40,14 +40,14 @@ SHOWN = 3
 
 def is_video(path: Path) -> bool:
     """Tell whether the name of a file says that it is a video."""
-    return path.suffix.lower() in SUFFIXES and path.name[0] != "." and path.is_file()
+    return path.suffix.lower() in SUFFIXES and path.is_file()
 
 
 def recognises(path: Path) -> bool:
     """Tell whether `path` is a video, or a folder with videos or with folders of videos."""
     if not path.is_dir():
         return is_video(path)
-    return any(is_video(file) for folder in (path, *_folders(path)) for file in folder.iterdir())
+    return any(is_video(file) for folder in (path, *_folders(path)) for file in listed(folder))
 
 
 def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
@@ -74,19 +74,9 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
         entry = next(iter(files.values())).name if len(cameras) == 1 else name
         length = next(iter(clips.values())).length
         told = known.get(name, DemoRow(name, "", ""))
+        facts = {"task": told.task, "identity": told.demo_id}
         spans = _spans(path, name, labels.get(name, ()), length)
-        episodes.append(
-            Recording(
-                index,
-                name,
-                length,
-                clips,
-                entry,
-                labels=spans,
-                task=told.task,
-                identity=told.demo_id,
-            )
-        )
+        episodes.append(Recording(index, name, length, clips, entry, labels=spans, **facts))
         uneven = {infos[file].n_frames for file in files.values()}
         if len(uneven) > 1 and all(_same(infos[file].fps, fps) for file in files.values()):
             notes.append(
@@ -150,7 +140,7 @@ def _cameras(root: Path) -> dict[str, dict[str, Path]]:
 
 def _videos(folder: Path) -> dict[str, Path]:
     found: dict[str, Path] = {}
-    for file in sorted(filter(is_video, folder.iterdir())):
+    for file in filter(is_video, listed(folder)):
         other = found.setdefault(file.stem, file)
         if other != file:
             raise PoolError(
@@ -160,8 +150,7 @@ def _videos(folder: Path) -> dict[str, Path]:
 
 
 def _folders(root: Path) -> list[Path]:
-    found = (path for path in root.iterdir() if path.is_dir() and path.name[0] != ".")
-    return sorted(found, key=lambda path: natural(path.name))
+    return sorted(filter(Path.is_dir, listed(root)), key=lambda path: natural(path.name))
 
 
 def _check_complete(
@@ -214,15 +203,15 @@ def _notes(
     others = Counter(f"{i.fps:.4g}" for i in infos.values() if not _same(i.fps, fps))
     if others:
         notes.append(
-            f"{sum(others.values())} videos of '{root}' have another rate ({', '.join(others)}) "
-            f"than most; they are read at {fps:g} frames per second."
+            f"Not all videos of '{root}' have the same rate: {sum(others.values())} of "
+            f"{len(infos)} are at {', '.join(others)} Hz and are read at {fps:g} Hz."
         )
     places = [root, *(_folders(root) if len(cameras) > 1 or CAMERA not in cameras else ())]
     ignored = sorted(
         str(file.relative_to(root))
         for place in places
-        for file in place.iterdir()
-        if file.is_file() and file.name[0] != "." and not is_video(file) and not is_table(file)
+        for file in listed(place)
+        if file.is_file() and not is_video(file) and not is_table(file)
     )
     if ignored:
         notes.append(f"Files of '{root}' that are no videos are left out: {_listed(ignored)}.")

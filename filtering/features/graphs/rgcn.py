@@ -20,7 +20,7 @@ from torch_geometric.data import Batch, Data
 from torch_geometric.nn import RGCNConv, global_add_pool
 
 from filtering.features.config import ClassifierConfig
-from filtering.features.relations import Relation
+from filtering.features.graphs.relations import Relation
 from filtering.features.training import class_labels, predict_logits, train
 from filtering.vision.determinism import seeded
 

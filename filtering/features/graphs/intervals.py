@@ -76,8 +76,8 @@ def find_intervals(
 def _smooth(active: NDArray[np.bool_], structure: int) -> NDArray[np.bool_]:
     """Close, then open along time; (n, N)."""
     element = np.ones((structure, 1), dtype=bool)
-    # Room on both sides: SciPy would count what the closing adds beyond the ends as inactive, and
+    # Padded on both sides: SciPy would count what the closing adds beyond the ends as inactive, and
     # so wear away what is active at the first or the last frame.
-    room = np.pad(active, ((structure, structure), (0, 0)))
-    smooth: NDArray[np.bool_] = binary_opening(binary_closing(room, element), element)
+    padded = np.pad(active, ((structure, structure), (0, 0)))
+    smooth: NDArray[np.bool_] = binary_opening(binary_closing(padded, element), element)
     return smooth[structure:-structure]

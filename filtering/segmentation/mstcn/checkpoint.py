@@ -8,8 +8,8 @@ from typing import Any
 from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 
-from filtering.segmentation.mstcn import MSTCN, MSTCNShape
-from filtering.segmentation.mstcn_segmenter import MSTCNSegmenter
+from filtering.segmentation.mstcn.network import MSTCN, MSTCNShape
+from filtering.segmentation.mstcn.segmenter import MSTCNSegmenter
 from filtering.segmentation.scaling import SCALINGS
 from filtering.vision.determinism import seeded
 from filtering.vision.frame_features import FrameSource

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.torch import save as save_tensors
 
-from filtering.segmentation.mstcn import MSTCN
-from filtering.segmentation.mstcn_training import frame_posteriors
+from filtering.segmentation.mstcn.network import MSTCN
+from filtering.segmentation.mstcn.training import frame_posteriors
 from filtering.segmentation.segments import Segmentation, decode, spans_of
 from filtering.vision.frame_features import (
     FrameSource,

@@ -5,8 +5,8 @@ import torch
 from numpy.typing import NDArray
 from torch_geometric.data import Data
 
-from filtering.features.intervals import Intervals
-from filtering.features.relations import NO_RELATION, Relation, relation_matrix
+from filtering.features.graphs.intervals import Intervals
+from filtering.features.graphs.relations import NO_RELATION, Relation, relation_matrix
 
 
 def interval_graph(intervals: Intervals, channels: int) -> Data:

@@ -1,4 +1,4 @@
-"""The seven ways in which two intervals of time lie to each other (paper section 3.2).
+"""The seven temporal relations between two intervals (paper section 3.2).
 
 Allen's thirteen relations are these seven, of which all but `equals` have a converse. A converse is
 no relation of its own: it is the same relation in the other direction.
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 class Relation(IntEnum):
-    """How [a, b) lies to [c, d); the number is the type of the edge."""
+    """Relation of [a, b) to [c, d); the number is the type of the edge."""
 
     BEFORE = 0
     """b < c: there is a gap between them."""
@@ -30,7 +30,7 @@ class Relation(IntEnum):
 
 
 NO_RELATION = -1
-"""Stands where a relation holds in the other direction only."""
+"""Entry where a relation holds in the other direction only."""
 
 
 def relation_matrix(starts: NDArray[np.number], stops: NDArray[np.number]) -> NDArray[np.int64]:

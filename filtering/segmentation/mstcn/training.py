@@ -1,8 +1,8 @@
 """Fitting MS-TCN++ to labelled videos.
 
-As published (Li et al., TPAMI 2020): Adam, one video per step. Two things are added,
-both for demonstrations, whose order must be judged later and so must not be learnt by heart:
-features are scaled within each video, and some videos are shown with their segments rearranged.
+As published (Li et al., TPAMI 2020): Adam, one video per step. Two additions keep the network from
+memorising the order of the sub-tasks, which is judged later: features are scaled within each video,
+and some videos are shown with their segments rearranged.
 """
 
 import sys
@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 from torch import Tensor
 from tqdm import tqdm
 
-from filtering.segmentation.mstcn import MSTCN, MSTCNShape, mstcn_loss
-from filtering.segmentation.scaling import SCALINGS, mean_and_scale, scaled
+from filtering.segmentation.config import MSTCNConfig
+from filtering.segmentation.mstcn.network import MSTCN, MSTCNShape, mstcn_loss
+from filtering.segmentation.scaling import mean_and_scale, scaled
 from filtering.vision.determinism import one_thread, seeded
 from teasim.common.errors import ConfigError
 from teasim.pool.types import runs
 
 FEWEST_FRAMES = 2
-"""The smoothing loss compares frames."""
+"""Least number of frames of a video; the smoothing loss compares neighbouring frames."""
 
 SHARE_OF_SHORTEST = 0.5
-"""Share of the shortest run that was shown which a run may still last: others may be quicker."""
+"""Least length of a run as a share of the shortest labelled one; others may be quicker."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,14 @@ class LabelledVideo:
     """A video whose frames are labelled."""
 
     name: str
-    """What it is called in messages."""
+    """Name in messages."""
     features: NDArray[np.float32]
     """(n, D), one row per frame."""
     labels: NDArray[np.int64]
     """(n,) label of each frame, 0..C-1."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be learnt from.
+        """Refuse videos that cannot be learned from.
 
         Raises:
             ConfigError: too few frames, features and labels of different length, or not finite.
@@ -60,70 +61,14 @@ class LabelledVideo:
             raise ConfigError(f"The features of the video {self.name} are not all finite numbers.")
 
 
-@dataclass(frozen=True)
-class MSTCNConfig:
-    """How MS-TCN++ is fitted; sizes and step size are those of its paper."""
-
-    epochs: int = 100
-    """Times every video is shown."""
-    learning_rate: float = 5e-4
-    """Step size of Adam."""
-    channels: int = 64
-    """Channels of every hidden layer."""
-    prediction_layers: int = 11
-    """Dual dilated layers of the prediction stage."""
-    refinement_stages: int = 3
-    """Stages after the prediction stage."""
-    refinement_layers: int = 10
-    """Dilated residual layers of each refinement stage."""
-    scaling: str = "video"
-    """video: each video's features get mean 0 and scale 1 first (another camera or light then
-    changes little); training: only the training set's mean and scale are taken out."""
-    rearranged: float = 0.5
-    """Chance that a video is shown with its segments in a random order, some left out [0..1]."""
-    left_out: float = 0.2
-    """Chance that a segment is left out of a video so shown [0..1]."""
-    seed: int = 0
-    """Seed of the initial weights, the dropout, the order of videos and their rearrangement."""
-
-    def __post_init__(self) -> None:
-        """Refuse settings that cannot train.
-
-        Raises:
-            ConfigError: in one sentence, with the choices.
-        """
-        counts = ("epochs", "channels", "prediction_layers", "refinement_layers")
-        for name, least in [*((name, 1) for name in counts), ("refinement_stages", 0), ("seed", 0)]:
-            if getattr(self, name) < least:
-                raise ConfigError(f"{name} is {getattr(self, name)}; choose {least} or more.")
-        if not self.learning_rate > 0.0:
-            raise ConfigError(f"learning_rate is {self.learning_rate}; choose a number above 0.")
-        for name in ("rearranged", "left_out"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ConfigError(f"{name} is {getattr(self, name)}; choose a chance from 0 to 1.")
-        if self.scaling not in SCALINGS:
-            raise ConfigError(f"Unknown scaling '{self.scaling}'; choose {', '.join(SCALINGS)}.")
-
-    def shape(self, features: int, labels: int) -> MSTCNShape:
-        """Return the sizes of the network for D features and C labels."""
-        return MSTCNShape(
-            features,
-            labels,
-            self.channels,
-            self.prediction_layers,
-            self.refinement_stages,
-            self.refinement_layers,
-        )
-
-
 class MSTCNLearner:
-    """minimise over theta: sum over videos of `mstcn_loss`, by Adam, one video per step.
+    """Minimises the sum of `mstcn_loss` over videos by Adam, one video per step.
 
     After `fit`:
         network_: the network, ready for inference.
         history_: mean loss of each epoch [nats, summed over the stages].
 
-    On one thread, with random numbers of its own: videos, settings and seed give the same bits.
+    It runs on one thread with its own random numbers: the result is bitwise reproducible.
     """
 
     network_: MSTCN
@@ -142,7 +87,7 @@ class MSTCNLearner:
         """
         _check(videos, n_labels)
         with one_thread(), seeded(self.config.seed):
-            network = MSTCN(self.config.shape(videos[0].features.shape[1], n_labels))
+            network = MSTCN(_shape(self.config, videos[0].features.shape[1], n_labels))
             _standardise(network, [scaled(v.features, self.config.scaling) for v in videos])
             self.history_ = self._descend(network, videos)
         self.network_ = network.eval()
@@ -170,7 +115,7 @@ class MSTCNLearner:
     def _shown(
         self, video: LabelledVideo, rng: np.random.Generator
     ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-        """Return the features and labels of a video as it is shown this time."""
+        """Return the features and labels of a video, rearranged with a certain probability."""
         order = np.arange(len(video.labels))
         if rng.random() < self.config.rearranged:
             order = rearrange(video.labels, rng, self.config.left_out)
@@ -183,8 +128,8 @@ def frame_posteriors(
     """Return the probability of each label in each frame, (n, C), for features (n, D).
 
     Args:
-        network: after training.
-        features: of one whole video.
+        network: the trained network.
+        features: those of one whole video.
         scaling: that of the training.
     """
     with one_thread(), torch.inference_mode():
@@ -203,7 +148,7 @@ def rearrange(
     Args:
         labels: (n,) label of each frame; a run of equal ones is a segment.
         rng: source of randomness.
-        left_out: chance that a segment is left out.
+        left_out: probability that a segment is left out.
     """
     found = runs(labels)
     order = rng.permutation(len(found))
@@ -214,15 +159,27 @@ def rearrange(
 
 
 def least_lengths(videos: Sequence[LabelledVideo], n_labels: int) -> list[float]:
-    """Return how long a run of each label is at least, C numbers [frames].
+    """Return the least length of a run of each of the C labels [frames].
 
-    SHARE_OF_SHORTEST of the shortest one that was shown; no bound for a label that was not.
+    It is SHARE_OF_SHORTEST of the shortest labelled run, and 0 for labels that never occur.
     """
     shown = [run for video in videos for run in runs(video.labels)]
     return [
         SHARE_OF_SHORTEST * min((run.length for run in shown if run.label == label), default=0)
         for label in range(n_labels)
     ]
+
+
+def _shape(config: MSTCNConfig, features: int, labels: int) -> MSTCNShape:
+    """Return the sizes of the network for D features and C labels."""
+    return MSTCNShape(
+        features,
+        labels,
+        config.channels,
+        config.prediction_layers,
+        config.refinement_stages,
+        config.refinement_layers,
+    )
 
 
 def _standardise(network: MSTCN, features: Sequence[NDArray[np.float32]]) -> None:

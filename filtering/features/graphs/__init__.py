@@ -1,0 +1,1 @@
+"""Intervals of activation as a graph of temporal relations, and its classifier."""

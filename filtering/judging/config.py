@@ -1,0 +1,78 @@
+"""Settings by which demonstrations are judged; light, so that `--help` needs no SciPy."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from tyro.constructors import PrimitiveConstructorSpec
+
+from filtering.judging.norm.precedence import Pairs, read_precedence
+from teasim.common.errors import ConfigError
+
+PRECEDENCE_FILE = PrimitiveConstructorSpec(
+    nargs=1,
+    metavar="FILE",
+    instance_from_str=lambda words: read_precedence(words[0]),
+    is_instance=lambda value: isinstance(value, tuple),
+    str_from_instance=lambda pairs: [str(list(pairs))],
+)
+"""How the command line reads precedence: from a file."""
+
+
+@dataclass(frozen=True)
+class JudgingConfig:
+    """How the segments of a pool become weights and groups."""
+
+    score: str = "norm"
+    """What demonstrations are judged by: norm (omissions, order and next steps, compared with what
+    most of the pool does) or equation3 (the next-step model of the paper)."""
+    groups: str = "auto"
+    """Number of groups: auto (kept; with the score norm also out of order and steps left out), 1
+    (nothing is flagged), 2 or 3."""
+    threshold: float | str = "auto"
+    """Weight below which a demonstration is flagged: a number between 0 and 1, auto (the rule of
+    the score), or the mid-points between groups of weights found by kmeans, gmm or minibatch."""
+    tolerance: float = 0.0
+    """Tolerance for behaviour that a minority shares, from 0 to below 1; 0.2 keeps legal orders
+    that a few demonstrations share. For the score norm."""
+    precedence: Annotated[Pairs, PRECEDENCE_FILE] = ()
+    """File with lines 'a before b', or a JSON list of pairs [a, b]: the only rules of order that
+    count. For the score norm."""
+    solver: str = "annealed"
+    """Solver of equation 3: annealed, alternating, exact (at most 24 different demonstrations) or
+    published (SLSQP of SciPy, without a ridge)."""
+    trusted_share: float = 0.5
+    """M / D, share of the demonstrations that equation 3 trusts, between 0 and 1."""
+    ridge: float = 0.01
+    """Strength of the ridge penalty on lambda of equation 3 [nats per unit squared]."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers out of range and settings that exclude each other.
+
+        Raises:
+            ConfigError: in one sentence, with the choices.
+        """
+        if not 0.0 <= self.tolerance < 1.0:
+            raise ConfigError(f"tolerance is {self.tolerance}; choose a share from 0 to below 1.")
+        if not 0.0 < self.trusted_share < 1.0:
+            raise ConfigError(
+                f"trusted_share is {self.trusted_share}; choose a share between 0 and 1."
+            )
+        if not 0.0 < self.ridge < math.inf:
+            raise ConfigError(f"ridge is {self.ridge}; choose a number above 0.")
+        if self.score != "norm" and (self.precedence or self.tolerance):
+            raise ConfigError(
+                f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
+            )
+        if not isinstance(self.threshold, str):
+            self._check_number(self.threshold)
+
+    def _check_number(self, threshold: float) -> None:
+        if not 0.0 < threshold < 1.0:
+            raise ConfigError(
+                f"threshold is {threshold}; choose a weight between 0 and 1, or the name of a rule."
+            )
+        if self.groups not in ("auto", "2"):
+            raise ConfigError(
+                f"The threshold {threshold} makes 2 groups, not {self.groups}; leave out groups."
+            )

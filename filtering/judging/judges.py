@@ -1,0 +1,128 @@
+"""From evidence to weights and groups: the two scores behind one interface.
+
+* `norm`, the default: the losses of `norm_score` plus those of ineffective steps, cut and grouped
+  by `norm.cut`.
+* `equation3`: the conditional next-step model of the paper, trimmed, with k-means on its weights.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from filtering.judging.config import JudgingConfig
+from filtering.judging.equation3.problem import Problem
+from filtering.judging.equation3.score import score
+from filtering.judging.equation3.sequence import transitions
+from filtering.judging.equation3.solvers import solver_named
+from filtering.judging.equation3.surprises import find_surprises
+from filtering.judging.evidence import Evidence
+from filtering.judging.explain import Finding
+from filtering.judging.norm.cut import decide
+from filtering.judging.norm.departures import find_departures
+from filtering.judging.norm.norm_score import NormScore, score_steps
+from filtering.judging.norm.precedence import precedence_graph
+from filtering.judging.thresholds import Grouping, group_weights
+from teasim.common.arrays import Array
+from teasim.common.registry import named
+
+INEFFECTIVE_PRIOR = 1.0
+"""Log-odds against an ineffective step before the video is examined [nats]. A round number, odds of
+e to 1; detection with it is reported for rendered tea pools in docs/results.md."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The result of judging the demonstrations of a pool."""
+
+    losses: Array
+    """(D,) surprise [nats], higher is worse."""
+    weights: Array
+    """(D,) in [0, 1], 1 for a usual demonstration."""
+    grouping: Grouping
+    """Groups and threshold on the weights."""
+    trust: Array
+    """(D,) how much each demonstration shapes the norm, in [0, 1]."""
+    findings: tuple[tuple[Finding, ...], ...]
+    """Per demonstration its unusual places, the most important one first."""
+    objective: float | None = None
+    """Value of equation 3 [nats per step]; None for another score."""
+
+
+Judge = Callable[[Evidence, JudgingConfig], Judgement]
+"""A score with its rule for weights and groups."""
+
+
+def by_norm(evidence: Evidence, config: JudgingConfig) -> Judgement:
+    """Judge by what most of the pool does (the default score).
+
+    Raises:
+        ConfigError: the precedence does not fit the pool, or there are fewer demonstrations than
+            groups.
+    """
+    counts = evidence.counts
+    if config.precedence:
+        counts = counts.restricted(precedence_graph(config.precedence, evidence.subtasks))
+    n_groups = 3 if config.groups == "3" else 2
+    found = score_steps(counts, tolerance=config.tolerance, n_groups=n_groups)
+    ineffective = ineffective_losses(found, evidence)
+    worst = np.array([nats.max(initial=0.0) for nats in ineffective])
+    losses = found.losses + worst
+    weights, grouping = decide(losses, found.left_out + worst > found.out_of_order, config.groups)
+    if config.threshold != "auto":
+        grouping = group_weights(weights, config.groups, config.threshold)
+    findings = find_departures(found, evidence.labels, evidence.places, ineffective)
+    return Judgement(losses, weights, grouping, found.trust, findings)
+
+
+def ineffective_losses(found: NormScore, evidence: Evidence) -> list[Array]:
+    """Return per demonstration (q,): what each segment adds for being ineffective [nats].
+
+    An ineffective step costs at most as much as leaving it out. Because few steps are ineffective,
+    the first INEFFECTIVE_PRIOR nats of evidence do not count. Only the largest of these values is
+    part of the loss of a demonstration.
+    """
+    if evidence.ineffective is None:
+        return [np.zeros(len(labels)) for labels in evidence.labels]
+    return [
+        np.clip(nats - INEFFECTIVE_PRIOR, 0.0, usual[labels])
+        for nats, usual, labels in zip(
+            evidence.ineffective, found.usual, evidence.labels, strict=True
+        )
+    ]
+
+
+def by_equation_3(evidence: Evidence, config: JudgingConfig) -> Judgement:
+    """Judge by the surprises of equation 3.
+
+    Raises:
+        ConfigError: there are too many different demonstrations for the solver, or fewer
+            demonstrations than groups.
+    """
+    rows = transitions(evidence.states, evidence.labels, len(evidence.subtasks))
+    problem = Problem(rows, config.ridge)
+    solved = solver_named(config.solver).fit(problem, config.trusted_share * rows.n_demos)
+    found = score(problem, solved)
+    threshold = "kmeans" if config.threshold == "auto" else config.threshold
+    return Judgement(
+        losses=found.losses,
+        weights=found.weights,
+        grouping=group_weights(found.weights, config.groups, threshold),
+        trust=solved.weights_,
+        findings=find_surprises(rows, found, evidence.labels, evidence.places),
+        objective=solved.objective_,
+    )
+
+
+JUDGES: Mapping[str, Judge] = MappingProxyType({"norm": by_norm, "equation3": by_equation_3})
+"""Every score by name."""
+
+
+def judge_named(name: str) -> Judge:
+    """Return the judge of a score.
+
+    Raises:
+        ConfigError: there is no score of that name.
+    """
+    return named("score", JUDGES, name)

@@ -1,0 +1,1 @@
+"""MS-TCN++: the network, its training, the segmenter that uses it, and its checkpoint."""

@@ -1,0 +1,93 @@
+"""Evaluate a saved policy of either level: print its scores, write them, compare, apply the bar."""
+
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from policies.checkpoint import load_policy
+from policies.learners.motion_policy import MotionPolicy
+from policies.learners.subtask_policy import SubtaskPolicy
+from policies.play.comparison import compare, comparison_json, comparison_text
+from policies.play.evaluation import evaluate_all
+from policies.play.joint_evaluation import evaluate_motion
+from policies.play.junit import Bar, write_junit
+from policies.play.results import as_json, motion_json, motion_summary, summary
+from policies.settings import EvaluateSettings, job_count
+from teasim.common.errors import ConfigError
+from teasim.common.files import write_json
+
+
+def run_evaluation(settings: EvaluateSettings) -> int:
+    """Evaluate the policy in the folder `settings.run` and print its scores.
+
+    Returns:
+        0, or 1 if the policy accuracy is below `settings.min_policy_accuracy`.
+
+    Raises:
+        CheckpointError: the folder holds no policy, or one for another environment.
+        ConfigError: a setting does not fit the policy, or the environment cannot be made.
+    """
+    for path in (settings.json, settings.junit):
+        check_file(path)
+    policy = load_policy(settings.run)
+    if isinstance(policy, MotionPolicy):
+        return _evaluate_joints(policy, settings)
+    return _evaluate_subtasks(policy, settings)
+
+
+def check_file(path: Path | None) -> None:
+    """Raise ConfigError if `path`, when given, is a folder."""
+    if path is not None and path.is_dir():
+        raise ConfigError(f"The output file '{path}' is a folder; name a file in it.")
+
+
+def _evaluate_subtasks(policy: SubtaskPolicy, settings: EvaluateSettings) -> int:
+    minimum = settings.min_policy_accuracy
+    bar = None if minimum is None else Bar(minimum)
+    rivals = [] if settings.against is None else [_load_rival(settings.against)]
+    scores, *others = evaluate_all([policy, *rivals], settings, jobs=job_count(settings.jobs))
+    record = _record(settings, "subtask")
+    print(summary(scores))
+    for other in others:
+        found = compare(scores, other)
+        record |= {"against": str(settings.against), "comparison": comparison_json(found)}
+        print(comparison_text(found, str(settings.against)))
+    if settings.json:
+        write_json(settings.json, record | {"scores": as_json(scores)})
+    if settings.junit:
+        write_junit(settings.junit, scores, bar)
+    if bar is None or bar.passed(scores):
+        return 0
+    print(f"policy accuracy is below {bar.percent:g} %")
+    return 1
+
+
+def _load_rival(run: Path) -> SubtaskPolicy:
+    """Load a policy that a policy over sub-tasks can be compared with."""
+    policy = load_policy(run)
+    if isinstance(policy, MotionPolicy):
+        raise ConfigError(
+            f"'{run}' holds a policy of the joint level; a comparison needs two over sub-tasks."
+        )
+    return policy
+
+
+def _evaluate_joints(policy: MotionPolicy, settings: EvaluateSettings) -> int:
+    asked = (settings.min_policy_accuracy, settings.against, settings.junit, settings.video)
+    if any(option is not None for option in asked):
+        raise ConfigError(
+            "A policy at the joint level chooses no sub-tasks; leave out --min-policy-accuracy, "
+            "--against, --junit and --video."
+        )
+    scores = evaluate_motion(policy, settings, jobs=job_count(settings.jobs))
+    print(motion_summary(scores))
+    if settings.json:
+        write_json(settings.json, _record(settings, "joint") | {"scores": motion_json(scores)})
+    return 0
+
+
+def _record(settings: EvaluateSettings, level: str) -> dict[str, Any]:
+    """What the scores are about, as JSON can hold it."""
+    world = asdict(settings.environment.at_level(level))
+    return {"run": str(settings.run), "version": version("teasim"), "world": world}

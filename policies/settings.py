@@ -1,0 +1,164 @@
+"""Settings of the verbs train, evaluate, ablate and demo, as the command line and Python take them.
+
+This module imports nothing heavy: options are understood before torch is loaded.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from teasim.common.errors import ConfigError
+from teasim.common.parallel import default_jobs
+
+SUBTASK_ENVIRONMENT = "teasim:teasim/TeaMakingSubtasks-v0"
+"""Gymnasium id of the environment whose actions are sub-tasks."""
+JOINT_ENVIRONMENT = "teasim:teasim/TeaMaking-v0"
+"""Gymnasium id of the environment whose actions are joint targets."""
+
+Out = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+Repeated = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
+Assignments = Annotated[Repeated, tyro.conf.arg(name="set", metavar="NAME=VALUE")]
+
+
+def job_count(jobs: int | None) -> int:
+    """Return the number of processes: `jobs`, or one per core for None."""
+    return default_jobs() if jobs is None else jobs
+
+
+@dataclass(frozen=True)
+class EnvironmentConfig:
+    """The environment in which a policy is evaluated."""
+
+    env_id: str | None = None
+    """Gymnasium id of the environment; default: TeaMakingSubtasks-v0 for a policy over sub-tasks,
+    TeaMaking-v0 for a policy over joints."""
+    quality: str = "fast"
+    """Rendering quality, fast or nice; use that of the pool."""
+    randomize: bool = True
+    """Move and turn the objects on the table from episode to episode."""
+    max_actions: int | None = 14
+    """Actions after which an episode is truncated; None: the environment has no such setting. At
+    the joint level an episode ends after 30 s without a new sub-task."""
+
+    def at_level(self, level: str) -> "EnvironmentConfig":
+        """Return the settings for a policy of `level`, subtask or joint, with the id filled in."""
+        if level == "joint":
+            return replace(self, env_id=self.env_id or JOINT_ENVIRONMENT, max_actions=None)
+        return replace(self, env_id=self.env_id or SUBTASK_ENVIRONMENT)
+
+
+Environment = Annotated[EnvironmentConfig, tyro.conf.arg(name="")]
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """Which episodes a policy is evaluated in."""
+
+    episodes: int = 50
+    """Episodes per mode (deterministic and sampled decisions)."""
+    seed: int = 1000
+    """Seed of the first episode; the others follow."""
+    environment: Environment = field(default_factory=EnvironmentConfig)
+    """The environment."""
+    video: Path | None = None
+    """Folder for videos of what the policy saw in the deterministic episodes: one frame per
+    decision, with the chosen sub-task written below it."""
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for less than one episode."""
+        if self.episodes < 1:
+            raise ConfigError(f"episodes is {self.episodes}; choose 1 or more.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateSettings(EvaluationConfig):
+    """Run a trained policy in the environment and score it."""
+
+    run: tyro.conf.Positional[Path]
+    """Folder of the policy."""
+    min_policy_accuracy: float | None = None
+    """Least policy accuracy [%] (strict, deterministic decisions); below it the exit code is 1."""
+    against: Path | None = None
+    """Folder of another policy, compared with the first on the same episodes."""
+    json: Path | None = None
+    """File for all scores and episodes."""
+    junit: Path | None = None
+    """JUnit XML file for a build server."""
+    jobs: int | None = None
+    """Processes that run episodes; default: one per core."""
+
+
+@dataclass(frozen=True)
+class TrainSettings:
+    """Train a policy on a pool of demonstrations."""
+
+    pool: tyro.conf.Positional[Path]
+    """Folder of the pool."""
+    out: Out
+    """New folder for the policy."""
+    learner: str = "bc"
+    """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (robust to incorrect
+    demonstrations); nearest at the level joint."""
+    learner_settings: Assignments = ()
+    """Setting of the learner, for example --set hidden=400; an unknown name lists the choices."""
+    level: str = "subtask"
+    """What the policy chooses: subtask (the next sub-task) or joint (the joint targets)."""
+    weights: Path | None = None
+    """Weight table (weights.csv of `teasim filter`)."""
+    use: str | None = None
+    """How the table is used: discard (leave out flagged demonstrations), weight, or ignore;
+    default: discard if there is a table."""
+    observe: str = "auto"
+    """What the policy sees: pixels, pixels_agent_pos, auto (joint positions too if the pool logs
+    them), or state (joint positions and environment state, no pictures: fast)."""
+    camera: Repeated = ()
+    """Cameras the policy sees; default: all of the pool."""
+    expert: tuple[int, ...] = ()
+    """Episodes known to be good, for a learner that needs experts; default: the quarter with the
+    largest weights in the table."""
+    seed: int = 0
+    """Seed of the learner."""
+    jobs: int | None = None
+    """Processes that read the pool; default: one per core."""
+
+    @property
+    def chosen_use(self) -> str:
+        """How the weight table is used, with the default filled in."""
+        return self.use or ("ignore" if self.weights is None else "discard")
+
+
+@dataclass(frozen=True)
+class AblateSettings:
+    """Train and score policies over pools x filters x learners x seeds."""
+
+    config: tyro.conf.Positional[Path]
+    """TOML file that says what is varied; docs/policies.md shows one."""
+    out: Out
+    """Folder for the results; an unfinished ablation in it is resumed."""
+    jobs: int | None = None
+    """Processes; default: one per core."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemoSettings:
+    """Run the whole method on a small pool: generate, filter, train, evaluate, report."""
+
+    out: Out
+    """New folder for the pool, the filter's output, the policies and the report."""
+    seq1: int = 10
+    """Correct demonstrations (Seq_1)."""
+    seq3: int = 4
+    """Incorrect demonstrations (Seq_3)."""
+    episodes: int = 12
+    """Episodes per policy and mode."""
+    seed: int = 0
+    """Seed of the pool and of the learner."""
+    frames_per_segment: int = 16
+    """Frames of each segment that the filter looks at; fewer than its default, for speed."""
+    environment: Environment = field(default_factory=partial(EnvironmentConfig, max_actions=10))
+    """The environment. Making tea takes 7 actions; a policy that needs 3 more has failed."""
+    jobs: int | None = None
+    """Processes; default: one per core."""
