@@ -7,11 +7,11 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from teasim.common.errors import PoolError
-from teasim.pool.hdf5_logs import StoredLog
 from teasim.pool.source import Clip
 from teasim.pool.types import GroundTruth, Span
 
@@ -19,6 +19,21 @@ ID_DIGITS = 16
 
 Usage = Callable[[Path, Sequence[str], bool], list[str]]
 """(root, entries, keep): command lines that make other tools keep or leave out the entries."""
+
+
+class Log(Protocol):
+    """A log of numbers of one demonstration, read when it is asked for."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the D dimensions."""
+
+    def read(self) -> np.ndarray:
+        """Return the log, (n, D) float32.
+
+        Raises:
+            PoolError: the file is missing or damaged.
+        """
 
 
 @dataclass(frozen=True)
@@ -43,7 +58,7 @@ class Recording:
     """The task as a sentence; empty when it is not stored."""
     record: GroundTruth | None = None
     """What is known about it; None unless it was converted from a pool that tells."""
-    logs: Mapping[str, StoredLog] = field(default_factory=dict)
+    logs: Mapping[str, Log] = field(default_factory=dict)
     """Logs of numbers by name."""
     identity: str = ""
     """Stored identity of a demonstration that was converted; empty when none is stored."""

@@ -8,6 +8,7 @@ import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from teasim.common.errors import PoolError
@@ -74,9 +75,9 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
         entry = next(iter(files.values())).name if len(cameras) == 1 else name
         length = next(iter(clips.values())).length
         told = known.get(name, DemoRow(name, "", ""))
-        facts = {"task": told.task, "identity": told.demo_id}
         spans = _spans(path, name, labels.get(name, ()), length)
-        episodes.append(Recording(index, name, length, clips, entry, labels=spans, **facts))
+        demo = Recording(index, name, length, clips, entry, labels=spans, task=told.task)
+        episodes.append(replace(demo, identity=told.demo_id))
         uneven = {infos[file].n_frames for file in files.values()}
         if len(uneven) > 1 and all(_same(infos[file].fps, fps) for file in files.values()):
             notes.append(
