@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from teasim.common.cli import parse
+from teasim.common.cli import parse, resumable
+from teasim.common.errors import Interrupted
 
 if TYPE_CHECKING:
     from teasim.pool.writers.content import Choice
@@ -88,6 +89,7 @@ class LabelSettings(ReadSettings):
     """Number of worker processes; by default one per core."""
 
 
+@resumable
 def main(argv: Sequence[str] | None = None) -> int:
     """Write a copy of a source in another format, with labels and verdicts.
 
@@ -113,6 +115,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return _write(settings, writer, choice, settings.dest)
 
 
+@resumable
 def label(argv: Sequence[str] | None = None) -> int:
     """Give names to sub-tasks that were found, in a copy of the source.
 
@@ -151,12 +154,10 @@ def _write(
     try:
         notes = write(writer, source, content, dest, jobs=jobs)
     except KeyboardInterrupt:
-        print(
-            f"teasim: {kept(dest)} of {len(content.items)} demonstrations are kept in "
-            f"'{staging_of(dest)}'; the same command continues.",
-            file=sys.stderr,
-        )
-        raise
+        raise Interrupted(
+            f"Interrupted; {kept(dest)} of {len(content.items)} demonstrations are kept in "
+            f"'{staging_of(dest)}', run the same command again to continue."
+        ) from None
     for note in notes:
         print(f"teasim: warning: {note}", file=sys.stderr)
     print(f"{len(content.items)} demonstrations in {dest} ({writer.name})")

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from teasim.cli import convert
 from teasim.cli.main import main
 from teasim.pool import Span
 from teasim.pool.readers.registry import open_source
@@ -121,9 +120,8 @@ def test_an_interrupt_says_what_is_kept(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("teasim.pool.writers.writing.write", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        convert.main([str(films), str(tmp_path / "pool"), "--to", "videos"])
+    assert main(["convert", str(films), str(tmp_path / "pool"), "--to", "videos"]) == 130
     assert capsys.readouterr().err == (
-        f"teasim: 1 of 4 demonstrations are kept in '{tmp_path / '.pool.incomplete'}'; the same "
-        "command continues.\n"
+        f"teasim: Interrupted; 1 of 4 demonstrations are kept in '{tmp_path / '.pool.incomplete'}',"
+        " run the same command again to continue.\n"
     )

@@ -1,4 +1,4 @@
-"""Laws of conversion: from every source to every format that can hold it, and back by its reader."""
+"""Laws of conversion: from every source to every format that can hold it, and back."""
 
 import json
 import shutil
