@@ -95,8 +95,7 @@ def write_filter_output(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_weight_table(folder / "weights.csv", rows)
-        rows_of_segments = segment_rows(pool.episodes, fitted.segments_.spans)
-        write_segments_table(folder / "segments.csv", rows_of_segments)
+        write_segments_table(folder / "segments.csv", segment_rows(pool, fitted.segments_.spans))
         write_json(folder / "filter.json", run_record(fitted, pool))
         write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
         write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))

@@ -16,6 +16,7 @@ from teasim.pool.source import Clip
 from teasim.pool.types import GroundTruth, Span
 
 ID_DIGITS = 16
+"""Hexadecimal digits of an identity, 64 bits: two of a million agree with probability 3e-8."""
 
 Usage = Callable[[Path, Sequence[str], bool], list[str]]
 """(root, entries, keep): command lines that make other tools keep or leave out the entries."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from teasim.common.errors import PoolError
 from teasim.common.files import write_text
 from teasim.pool.lerobot.identity import matched
-from teasim.pool.source import Demonstration
+from teasim.pool.source import Demonstration, Source
 from teasim.pool.types import Span
 
 
@@ -46,13 +46,11 @@ class SegmentRow:
 COLUMNS = tuple(field.name for field in fields(SegmentRow))
 
 
-def segment_rows(
-    demos: Sequence[Demonstration], spans: Sequence[Sequence[Span]]
-) -> list[SegmentRow]:
-    """Return the rows of some demonstrations and their segments."""
+def segment_rows(source: Source, spans: Sequence[Sequence[Span]]) -> list[SegmentRow]:
+    """Return the rows of all segments, given those of each demonstration of a source."""
     return [
         SegmentRow(demo.demo_id, demo.index, span.subtask, span.start, span.stop)
-        for demo, own in zip(demos, spans, strict=True)
+        for demo, own in zip(source.episodes, spans, strict=True)
         for span in own
     ]
 

@@ -21,9 +21,9 @@ def films(tmp_path: Path) -> Path:
 
 def table_of(source: Path, path: Path) -> Path:
     """Two segments in each demonstration."""
-    demos = open_source(source).episodes
-    spans = [(Span("step 1", 0, 2), Span("step 2", 2, 4)) for _ in demos]
-    write_segments_table(path, segment_rows(demos, spans))
+    opened = open_source(source)
+    spans = [(Span("step 1", 0, 2), Span("step 2", 2, 4)) for _ in opened.episodes]
+    write_segments_table(path, segment_rows(opened, spans))
     return path
 
 

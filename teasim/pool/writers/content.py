@@ -139,7 +139,7 @@ def sampled(length: int, fps: float, rate: float) -> np.ndarray:
         return np.arange(length)
     last = int((length - 1) * rate / fps + 0.25)
     times = np.arange(last + 1) * fps / rate
-    return np.minimum(np.floor(times + 0.5).astype(np.int64), length - 1)
+    return np.minimum((times + 0.5).astype(np.int64), length - 1)
 
 
 def sampled_spans(spans: Sequence[Span], frames: np.ndarray) -> tuple[Span, ...]:

@@ -21,6 +21,7 @@ from teasim.pool.types import GroundTruth, PoolHeader
 
 MANIFEST_FORMAT = "teasim-pool"
 MANIFEST_VERSION = 1
+"""Version of the form of the manifest."""
 
 
 def finalize_pool(root: Path | str, header: PoolHeader, n_episodes: int) -> Pool:
