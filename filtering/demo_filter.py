@@ -19,7 +19,8 @@ from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
 from filtering.judging.evidence import Evidence
 from filtering.judging.explain import Finding, explain
-from filtering.judging.judges import Judgement, judge_named
+from filtering.judging.judgement import Judgement
+from filtering.judging.judges import judge_named
 from filtering.judging.thresholds import probability_incorrect
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
