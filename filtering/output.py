@@ -18,10 +18,11 @@ from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
 from teasim.common.errors import ConfigError, TeasimError
 from teasim.common.files import write_json, write_text
+from teasim.pool.segments_table import segment_rows, write_segments_table
 from teasim.pool.source import Source
 from teasim.pool.weight_table import write_weight_table
 
-FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
+FILES = ("weights.csv", "segments.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
 """Files of an output folder."""
 PACKAGES = ("teasim", "numpy", "scipy", "scikit-learn", "torch", "opencv-python-headless")
 """Packages whose versions are recorded, because weights may depend on them."""
@@ -94,6 +95,7 @@ def write_filter_output(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_weight_table(folder / "weights.csv", rows)
+        write_segments_table(folder / "segments.csv", segment_rows(pool, fitted.segments_.spans))
         write_json(folder / "filter.json", run_record(fitted, pool))
         write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
         write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))
