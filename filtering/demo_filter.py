@@ -21,7 +21,7 @@ from filtering.judging.evidence import Evidence
 from filtering.judging.explain import Finding, explain
 from filtering.judging.judgement import Judgement
 from filtering.judging.judges import judge_named
-from filtering.judging.thresholds import probability_incorrect
+from filtering.judging.thresholds import group_weights, probability_incorrect
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
@@ -189,6 +189,11 @@ from the whole video.
         timeline = Timeline([e.length for e in episodes], [e.name for e in episodes], pool.fps)
         with self._timed("weights"):
             judgement, score = judge_moments(seen, timeline, self.config.groups)
+            if self.config.threshold != "auto":
+                grouping = group_weights(
+                    judgement.weights, self.config.groups, self.config.threshold
+                )
+                judgement = replace(judgement, grouping=grouping)
         with self._timed("segments"):
             if self.chosen_.segmenter == AGREEMENT:
                 self.segments_ = agreed_segments(score.counterparts, timeline.lengths)

@@ -164,6 +164,33 @@ def strip_ground_truth(path: Path | str) -> Pool:
     return Pool.open(root)
 
 
+def strip_labels(path: Path | str) -> Pool:
+    """Take every label out of a pool: all that is known to be correct, and all sub-tasks."""
+    root = Path(path)
+    shutil.rmtree(root / "teasim")
+    (root / "meta" / "subtasks.parquet").unlink()
+    (root / "meta" / "temporal_proportions_sparse.json").unlink()
+    info = json.loads((root / "meta" / "info.json").read_text())
+    info["features"] = {n: f for n, f in info["features"].items() if not _is_label(n)}
+    (root / "meta" / "info.json").write_text(json.dumps(info))
+    for folder in ("meta/episodes", "data"):
+        for file in (root / folder).rglob("*.parquet"):
+            rewrite_table(
+                file,
+                lambda table: table.select([n for n in table.column_names if not _is_label(n)]),
+            )
+    return Pool.open(root)
+
+
+def _unlabelled(table: pa.Table) -> pa.Table:
+    return table.select([name for name in table.column_names if not _is_label(name)])
+
+
+def _is_label(column: str) -> bool:
+    kept = ("teasim/", "sparse_", "subtask_index", "next.")
+    return column.startswith(kept) and column != "teasim/demo_id"
+
+
 def rewrite_table(path: Path, change: Callable[[pa.Table], pa.Table]) -> None:
     """Replace a parquet file by a changed one."""
     table = change(pq.read_table(path))

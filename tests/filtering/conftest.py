@@ -41,4 +41,4 @@ def toy_pool(tmp_path_factory: pytest.TempPathFactory) -> Pool:
 
 @pytest.fixture(scope="session")
 def toy_filter(toy_pool: Pool) -> DemoFilter:
-    return DemoFilter(FilterConfig()).fit(toy_pool)
+    return DemoFilter(FilterConfig(segmenter="logged")).fit(toy_pool)

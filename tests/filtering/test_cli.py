@@ -88,7 +88,7 @@ def test_every_setting_of_the_filter_is_an_option(
 def test_a_threshold_can_be_a_number(
     toy_pool: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    argv = [str(toy_pool.root), "--jobs", "1", "--no-effects"]
+    argv = [str(toy_pool.root), "--jobs", "1", "--no-effects", "--segmenter", "logged"]
     assert main([*argv, "-o", str(tmp_path / "a"), "--threshold", "0.001"]) == 0
     assert "0 of 7 demonstrations are flagged." in capsys.readouterr().out
     assert main([*argv, "-o", str(tmp_path / "b"), "--threshold", "0.45"]) == 0
@@ -127,6 +127,7 @@ def test_a_page_that_cannot_be_made_loses_no_result(
         "exclude.txt",
         "filter.json",
         "keep.txt",
+        "segments.csv",
         "weights.csv",
     ]
 
@@ -162,7 +163,10 @@ def test_too_many_flagged_is_exit_code_1(
             ["--segmenter", "clustering", "--subtasks", "few"],
             "subtasks is 'few'; choose auto or a number from 1.",
         ),
-        (["--fps", "5"], "The pool '{pool}' stores its own frame rate; leave out fps."),
+        (
+            ["--fps", "5"],
+            "The option fps does not apply to '{pool}' (LeRobot data set); leave it out.",
+        ),
         (
             ["--segmenter", "predictions"],
             "The demonstration 'video 0' of '{pool}' has no sub-tasks that the segmenter "

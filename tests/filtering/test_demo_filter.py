@@ -14,8 +14,9 @@ from filtering.segmentation.segmenter import segmenter_named
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool
 from tests.filtering.conftest import TOY_SEQUENCES
-from tests.toy_pool import SEQ_1, make_toy_pool, strip_ground_truth
+from tests.toy_pool import SEQ_1, make_toy_pool, strip_ground_truth, strip_labels
 
+LOGGED = FilterConfig(segmenter="logged")
 WRONG = [sequence != SEQ_1 for sequence in TOY_SEQUENCES]
 
 
@@ -45,11 +46,20 @@ def test_the_filter_never_reads_the_ground_truth(
 ) -> None:
     stripped = strip_ground_truth(shutil.copytree(toy_pool.root, tmp_path / "stripped"))
     assert all(episode.record is None for episode in stripped.episodes)
-    assert DemoFilter().fit(stripped).table() == toy_filter.table()
+    assert DemoFilter(LOGGED).fit(stripped).table() == toy_filter.table()
+
+
+def test_no_label_changes_a_weight_of_the_default_filter(toy_pool: Pool, tmp_path: Path) -> None:
+    stripped = strip_labels(shutil.copytree(toy_pool.root, tmp_path / "stripped"))
+    assert stripped.subtasks == ()
+    assert not any(episode.spans() for episode in stripped.episodes)
+    found = DemoFilter().fit(stripped)
+    assert found.chosen_.score == "moments"
+    assert found.table() == DemoFilter().fit(toy_pool).table()
 
 
 def test_with_one_group_nothing_is_flagged(toy_pool: Pool) -> None:
-    found = DemoFilter(FilterConfig(groups="1")).fit(toy_pool)
+    found = DemoFilter(FilterConfig(segmenter="logged", groups="1")).fit(toy_pool)
     assert not found.flagged_.any()
     assert found.threshold_ == 0.0
 
@@ -59,7 +69,7 @@ def test_a_pool_of_another_task_is_filtered(tmp_path: Path) -> None:
     pool = make_toy_pool(
         tmp_path / "cook", [full] * 4 + [("cut", "serve")], frames_per_subtask=3, cameras=("main",)
     )
-    found = DemoFilter().fit(pool)
+    found = DemoFilter(LOGGED).fit(pool)
     assert found.cameras_ == ("main",)
     assert found.flagged_.tolist() == [False] * 4 + [True]
     assert "'fry' is missing" in found.reasons_[-1]
@@ -108,7 +118,7 @@ def test_the_example_of_the_filter_runs() -> None:
 def test_too_small_pools_are_refused(tmp_path: Path) -> None:
     pool = make_toy_pool(tmp_path / "two", [SEQ_1] * 2, frames_per_subtask=2)
     with pytest.raises(ConfigError, match=r"has 2 demonstrations; a filter needs 3 or more\.$"):
-        DemoFilter().fit(pool)
+        DemoFilter(LOGGED).fit(pool)
 
 
 class _Unlabelled:
@@ -144,14 +154,14 @@ def test_segment_labels_are_numbers_of_the_pools_subtasks(toy_pool: Pool) -> Non
 
 @pytest.mark.parametrize("name", JUDGES)
 def test_every_score_finds_the_same_in_an_easy_pool(name: str, toy_pool: Pool) -> None:
-    found = DemoFilter(FilterConfig(score=name)).fit(toy_pool)
+    found = DemoFilter(FilterConfig(segmenter="logged", score=name)).fit(toy_pool)
     assert found.flagged_.tolist() == WRONG
     assert (found.weights_ < found.threshold_).tolist() == WRONG
     assert found.losses_[~found.flagged_].max() < found.losses_[found.flagged_].min()
 
 
 def test_equation_3_trusts_half_of_the_pool_and_says_its_value(toy_pool: Pool) -> None:
-    found = DemoFilter(FilterConfig(score="equation3")).fit(toy_pool)
+    found = DemoFilter(FilterConfig(segmenter="logged", score="equation3")).fit(toy_pool)
     assert found.trust_.sum() == pytest.approx(len(WRONG) / 2, abs=1e-6)
     assert found.objective_ is not None
     assert found.objective_ > 0
@@ -162,7 +172,7 @@ def test_equation_3_trusts_half_of_the_pool_and_says_its_value(toy_pool: Pool) -
 @pytest.mark.parametrize("name", JUDGES)
 def test_no_score_flags_anything_in_a_clean_pool(name: str, tmp_path: Path) -> None:
     pool = make_toy_pool(tmp_path / "clean", [SEQ_1] * 5, frames_per_subtask=3)
-    found = DemoFilter(FilterConfig(score=name)).fit(pool)
+    found = DemoFilter(FilterConfig(segmenter="logged", score=name)).fit(pool)
     assert not found.flagged_.any()
     assert found.threshold_ == 0.0
     assert found.weights_ == pytest.approx(np.ones(5), abs=0.01)

@@ -85,11 +85,13 @@ def test_what_was_learned_comes_back_and_decides_the_same(folder, toy_pool):
 
 
 def test_the_filter_uses_learned_features(folder, toy_pool):
-    config = FilterConfig(features=str(folder), score="equation3", groups="2")
+    config = FilterConfig(segmenter="logged", features=str(folder), score="equation3", groups="2")
     filtered = DemoFilter(config).fit(toy_pool)
     assert len(filtered.weights_) == len(toy_pool.episodes)
     # Equation 3 sees the segments through these features alone.
-    pooled = DemoFilter(FilterConfig(score="equation3", groups="2")).fit(toy_pool)
+    pooled = DemoFilter(FilterConfig(segmenter="logged", score="equation3", groups="2")).fit(
+        toy_pool
+    )
     assert not np.array_equal(filtered.losses_, pooled.losses_)
 
 
@@ -102,15 +104,19 @@ def test_features_that_are_not_there_are_refused_with_the_choices(folder, toy_po
     )
     with pytest.raises(ConfigError) as unused:
         FilterConfig(features=str(tmp_path))
-    assert str(unused.value) == "The score 'norm' takes no features; choose equation3."
+    assert str(unused.value) == "The score 'auto' takes no features; choose equation3."
     with pytest.raises(CheckpointError) as missing:
-        DemoFilter(FilterConfig(features=str(tmp_path), score="equation3")).fit(toy_pool)
+        DemoFilter(FilterConfig(segmenter="logged", features=str(tmp_path), score="equation3")).fit(
+            toy_pool
+        )
     assert str(missing.value) == (
         f"'{tmp_path}' holds no learned features: generator.json cannot be read."
     )
     sideways = make_toy_pool(tmp_path / "p", [toy_pool.subtasks] * 3, size=16, cameras=("left",))
     with pytest.raises(ConfigError) as other:
-        DemoFilter(FilterConfig(features=str(folder), score="equation3")).fit(sideways)
+        DemoFilter(FilterConfig(segmenter="logged", features=str(folder), score="equation3")).fit(
+            sideways
+        )
     assert str(other.value) == (
         "The features were learned from the camera 'cup', which the pool "
         f"'{sideways.root}' lacks; it has left."

@@ -21,7 +21,7 @@ QUICK = MSTCNConfig(epochs=2, channels=8, prediction_layers=3, refinement_layers
 
 
 def flagged(pool: Pool, **settings) -> list[bool]:
-    found = DemoFilter(FilterConfig(**settings)).fit(pool)
+    found = DemoFilter(FilterConfig(**{"segmenter": "logged"} | settings)).fit(pool)
     assert np.isfinite(found.losses_).all()
     assert np.isfinite(found.weights_).all()
     return found.flagged_.tolist()

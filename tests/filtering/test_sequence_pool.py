@@ -114,7 +114,7 @@ def test_with_a_frame_rate_times_are_seconds(folder: Path, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", JUDGES)
 def test_every_score_judges_step_lists(folder: Path, name: str) -> None:
-    found = DemoFilter(FilterConfig(score=name)).fit(SequencePool.open(folder))
+    found = DemoFilter(FilterConfig(segmenter="logged", score=name)).fit(SequencePool.open(folder))
     assert np.flatnonzero(found.flagged_).tolist() == [2]
     assert "'add_water' is missing" in found.reasons_[2]
     assert found.cameras_ == ()
