@@ -26,6 +26,7 @@ from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
 from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.soundness import require_sound
 from teasim.pool.source import Source
 from teasim.pool.weight_table import WeightRow
@@ -111,12 +112,12 @@ from the whole video.
         """Keep the settings; None means the defaults."""
         self.config = FilterConfig() if config is None else config
 
-    def fit(self, pool: Source, *, jobs: int = 1) -> Self:
+    def fit(self, pool: Source, *, workers: Workers = IN_PROCESS) -> Self:
         """Weigh the demonstrations of `pool`, which is not modified.
 
         Args:
             pool: what to filter.
-            jobs: number of worker processes; the result does not depend on it.
+            workers: where the work runs; the result does not depend on it.
 
         Raises:
             ConfigError: the pool has too few demonstrations, lacks a camera, or has no pictures
@@ -128,9 +129,9 @@ from the whole video.
         require_sound(pool)
         self.cameras_ = self._cameras(pool)
         with self._timed("segments"):
-            self.segments_ = self._segments(pool, jobs)
+            self.segments_ = self._segments(pool, workers)
         with self._timed("features"):
-            evidence = self._evidence(pool, jobs)
+            evidence = self._evidence(pool, workers)
         # The matrices are small: several BLAS threads would only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
             self._learn(judge_named(self.config.score)(evidence, self.config))
@@ -181,28 +182,30 @@ from the whole video.
                 )
         return ()
 
-    def _segments(self, pool: Source, jobs: int) -> Segmentation:
+    def _segments(self, pool: Source, workers: Workers) -> Segmentation:
         segmenter = segmenter_named(self.config.segmenter, self.config.subtasks, self.cameras_)
-        return segmenter(pool, jobs=jobs)
+        return segmenter(pool, workers=workers)
 
-    def _evidence(self, pool: Source, jobs: int) -> Evidence:
+    def _evidence(self, pool: Source, workers: Workers) -> Evidence:
         """Return the evidence that the score uses."""
         known = Evidence(self.segments_.subtasks, self.segments_.spans)
         if self.config.score == "equation3":
-            return replace(known, states=self._states(pool, jobs))
+            return replace(known, states=self._states(pool, workers))
         if self.config.effects and pool.cameras:
-            return replace(known, ineffective=self._ineffective(pool, known, jobs))
+            return replace(known, ineffective=self._ineffective(pool, known, workers))
         return known
 
-    def _ineffective(self, pool: Source, known: Evidence, jobs: int) -> list[NDArray[np.float64]]:
+    def _ineffective(
+        self, pool: Source, known: Evidence, workers: Workers
+    ) -> list[NDArray[np.float64]]:
         """Return per demonstration (q,): how surprisingly little each segment changed [nats]."""
         source = FrameSource(self.config.cameras or pool.cameras)
         rests = look_at_rests(
-            pool.episodes, self.segments_.spans, frame_rate(pool), source, jobs=jobs
+            pool.episodes, self.segments_.spans, frame_rate(pool), source, workers=workers
         )
         return effect_surprises([changes(rest) for rest in rests], known.labels)
 
-    def _states(self, pool: Source, jobs: int) -> list[NDArray[np.float64]]:
+    def _states(self, pool: Source, workers: Workers) -> list[NDArray[np.float64]]:
         """Return per demonstration (q, N): features of its segments; one-hot without pictures."""
         if not pool.cameras:
             eye = np.eye(len(self.segments_.subtasks))
@@ -213,14 +216,14 @@ from the whole video.
             from filtering.features.checkpoint import load_features
 
             learned = load_features(Path(self.config.features))
-            return reduce_features(learned.describe(pool, spans, jobs=jobs))
+            return reduce_features(learned.describe(pool, spans, workers=workers))
         features = segment_features(
             pool,
             spans,
             cameras=self.cameras_,
             frames_per_segment=self.config.frames_per_segment,
             background=self.config.background,
-            jobs=jobs,
+            workers=workers,
         )
         return reduce_features(features)
 

@@ -22,6 +22,7 @@ from filtering.vision.frame_features import (
     sampled_frames,
     side_by_side,
 )
+from teasim.common.workers import Workers
 from teasim.pool import Span
 from teasim.pool.source import Clip, Demonstration
 
@@ -64,7 +65,7 @@ def look_at_rests(
     fps: float,
     source: FrameSource,
     *,
-    jobs: int,
+    workers: Workers,
 ) -> list[NDArray[np.float64]]:
     """Return per demonstration `rest_features` (q + 1, F), computed from these frames alone.
 
@@ -73,7 +74,7 @@ def look_at_rests(
         segments: the segments of each.
         fps: frames per second of their videos.
         source: cameras and rate.
-        jobs: worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
@@ -88,7 +89,7 @@ def look_at_rests(
         for camera in source.cameras:
             seen = tuple(frames[used].tolist())
             tasks.append(RestTask(episode.clip(camera), seen, default_folder()))
-    described = look_up_or_describe(tasks, _key, describe_rests, jobs)
+    described = look_up_or_describe(tasks, _key, describe_rests, workers)
     videos = side_by_side(described, len(source.cameras))
     return [_means(moments, chosen) for moments, chosen in zip(videos, places, strict=True)]
 

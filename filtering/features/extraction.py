@@ -11,6 +11,7 @@ from filtering.vision.background import subtraction_named
 from filtering.vision.cache import ArrayCache, default_folder
 from filtering.vision.frame_features import clip_key, look_up_or_describe, side_by_side
 from filtering.vision.frames import Frames, fit_size, segment_indices, uniform_indices
+from teasim.common.workers import Workers
 from teasim.pool import Span
 from teasim.pool.source import Clip, Source
 
@@ -44,7 +45,7 @@ def segment_features(
     cameras: Sequence[str],
     frames_per_segment: int,
     background: str,
-    jobs: int,
+    workers: Workers,
 ) -> list[NDArray[np.float32]]:
     """Return per demonstration features (q, F) of its segments.
 
@@ -54,7 +55,7 @@ def segment_features(
         cameras: cameras to use; their features are concatenated.
         frames_per_segment: largest number of frames used per segment.
         background: name of the background subtraction.
-        jobs: worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
@@ -65,7 +66,7 @@ def segment_features(
         for episode, spans in zip(pool.episodes, segments, strict=True)
         for camera in cameras
     ]
-    frames = look_up_or_describe(tasks, _key, describe_video, jobs)
+    frames = look_up_or_describe(tasks, _key, describe_video, workers)
     described = [pool_over_time(task, found) for task, found in zip(tasks, frames, strict=True)]
     return side_by_side(described, len(cameras))
 

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
 from teasim.pool.source import Source
 from teasim.pool.types import runs
@@ -59,8 +60,8 @@ def label_numbers(spans: Sequence[tuple[Span, ...]], subtasks: tuple[str, ...]) 
 class Segmenter(Protocol):
     """Finds the segments of every demonstration of a source."""
 
-    def __call__(self, source: Source, /, *, jobs: int = 1) -> Segmentation:
-        """Return them in the order of `source.episodes`; they do not depend on `jobs`."""
+    def __call__(self, source: Source, /, *, workers: Workers = IN_PROCESS) -> Segmentation:
+        """Return them in the order of `source.episodes`; they do not depend on `workers`."""
 
 
 def decode(

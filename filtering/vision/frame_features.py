@@ -16,6 +16,7 @@ from filtering.vision.frames import fit_size, uniform_indices
 from filtering.vision.pretrained import feature_recipe
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
+from teasim.common.workers import Workers
 from teasim.pool.source import Clip, Demonstration
 
 CHUNK = 64
@@ -89,7 +90,7 @@ def moment_of_frames(length: int, count: int) -> NDArray[np.int64]:
 
 
 def frame_features(
-    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, jobs: int
+    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, workers: Workers
 ) -> list[NDArray[np.float32]]:
     """Return per demonstration (n, F * cameras), n = sample_count(...).
 
@@ -97,7 +98,7 @@ def frame_features(
         episodes: the demonstrations.
         fps: frames per second of their videos.
         source: cameras and rate.
-        jobs: worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
@@ -111,7 +112,7 @@ def frame_features(
         for episode in episodes
         for camera in source.cameras
     ]
-    described = look_up_or_describe(tasks, _key, describe_moments, jobs)
+    described = look_up_or_describe(tasks, _key, describe_moments, workers)
     return side_by_side(described, len(source.cameras))
 
 
@@ -119,7 +120,7 @@ def look_up_or_describe(
     tasks: Sequence[Task],
     key: Callable[[Task], str],
     describe: Callable[[Task], NDArray[np.float32]],
-    jobs: int,
+    workers: Workers,
 ) -> list[NDArray[np.float32]]:
     """Return what `describe` gives for each task; workers start only for what is not cached."""
     known = {n: ArrayCache(task.cache_folder).get(key(task)) for n, task in enumerate(tasks)}
@@ -127,7 +128,7 @@ def look_up_or_describe(
     computed = parallel.run(
         describe,
         [tasks[number] for number in unknown],
-        jobs=jobs,
+        workers=workers,
         description="looking at videos",
     )
     known.update(zip(unknown, computed, strict=True))

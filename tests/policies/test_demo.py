@@ -10,13 +10,14 @@ from policies.experiments import demo
 from policies.experiments.demo import ALL, KEPT, run_demo
 from policies.settings import DemoSettings, EnvironmentConfig
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.workers import IN_PROCESS
 from tests.policies.conftest import WITHOUT_TEA_BAG
 from tests.policies.fakes import FAKE_ID, SEQ_1, make_fake_pool
 
 
 def settings(out):
     world = EnvironmentConfig(FAKE_ID)
-    return DemoSettings(out=out, seq1=6, seq3=2, episodes=2, environment=world, jobs=1)
+    return DemoSettings(out=out, seq1=6, seq3=2, episodes=2, environment=world, workers=IN_PROCESS)
 
 
 def fake_generate(path, config, jobs):
