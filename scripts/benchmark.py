@@ -183,11 +183,11 @@ def decoding(size: int, repeats: int) -> dict[str, float]:
         clip = VideoClip.whole(path)
         works: dict[str, Callable[[], object]] = {
             "clip": lambda: deque(clip.stream(range(frames)), maxlen=0),
-            "floor": lambda: bare_decoding(path),
+            "bare loop": lambda: bare_decoding(path),
         }
         found = medians(works, repeats)
     spent = {f"{name} per frame": 1000 * value / frames for name, value in found.items()}
-    return spent | {"ratio": found["clip"] / found["floor"]}
+    return spent | {"ratio": found["clip"] / found["bare loop"]}
 
 
 def bare_decoding(path: Path) -> None:

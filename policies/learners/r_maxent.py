@@ -33,7 +33,7 @@ from policies.learners.bc import shape_for
 from policies.learners.networks import DecisionNetwork
 from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
-from teasim.common.trust import trust
+from teasim.common.trimming import soft_trim
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def solve(problem: Problem, config: RMaxEntConfig) -> Solution:
     for temperature in np.geomspace(config.hottest, config.coldest, config.steps):
         multipliers = fit_multipliers(problem, weights / trusted, multipliers, config.ridge)
         losses = demo_losses(problem, multipliers)
-        weights = trust(losses, problem.copies, trusted, temperature)
+        weights = soft_trim(losses, problem.copies, trusted, temperature)
         history.append(float(problem.copies * weights @ losses / trusted))
     return Solution(multipliers, weights, tuple(history))
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 WIDTH = 80
 """Columns of the text, those of a terminal that nobody has resized."""
-WIDEST_CELL = 16
-"""Characters after which a cell is cut off; a demo_id has 16."""
+WIDEST_CELL = 19
+"""Characters after which a cell is cut off; a demo_id has 19."""
 UNKNOWN = "-"
 """What the text shows for a value that is not stored."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,6 @@ import tyro
 from teasim.common.cli import parse
 
 if TYPE_CHECKING:
-    from teasim.pool.readers.reader import Reader
     from teasim.pool.source import Source
 
 EXAMPLES = (
@@ -33,6 +32,9 @@ class InspectSettings:
     demonstrations (AUROC: 0.5 is chance). Needs a pool with labels of correctness."""
     fps: float | None = None
     """Frames per second [1/s] of a source that does not store them."""
+    repair: Path | None = None
+    """New folder for a sound copy of a LeRobot data set. Damaged demonstrations are set aside in
+    it; the source is not changed."""
     json: tyro.conf.FlagCreatePairsOff[bool] = False
     """Print one JSON object instead of text."""
 
@@ -48,11 +50,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         PoolError: nothing readable is at the path, or `--leakage` lacks labels.
     """
     settings = parse(InspectSettings, argv, verb="inspect", examples=EXAMPLES)
+    if settings.repair is not None:
+        return _repair(settings, settings.repair)
     from teasim.cli.facts import facts_of, json_of, problem_count, text_of
     from teasim.pool.readers.registry import reader_of
 
     reader = reader_of(settings.source)
-    source, problems = _open_and_check(reader, settings)
+    source, problems = _open_and_check(settings)
     clues = _leakage(source) if settings.leakage and source is not None and not problems else None
     facts = None if source is None else facts_of(source)
     if settings.json:
@@ -67,26 +71,48 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 1 if problems else 0
 
 
-def _open_and_check(reader: Reader, settings: InspectSettings) -> tuple[Source | None, list[str]]:
+def _open_and_check(settings: InspectSettings) -> tuple[Source | None, list[str]]:
     """The source, None if it cannot be opened, and one sentence per problem."""
     from teasim.common.errors import PoolError
     from teasim.pool.readers.reader import ReadOptions
+    from teasim.pool.readers.registry import check_source, open_source
+    from teasim.pool.soundness import print_notes
 
     options = ReadOptions(fps=settings.fps)
-    check = _check_of(reader)
-    problems = [] if check is None else check(settings.source)
+    problems = check_source(settings.source, options)
     try:
-        return reader.open(settings.source, options), problems
+        source = open_source(settings.source, options)
     except PoolError as error:
         return None, list(dict.fromkeys([*problems, str(error)]))
+    print_notes(source)
+    return source, problems
 
 
-def _check_of(reader: Reader) -> Callable[[Path], list[str]] | None:
-    """The reader's own search for damage; without one, a source is sound if it can be opened."""
-    from teasim.pool.integrity import check_pool
+def _repair(settings: InspectSettings, target: Path) -> int:
+    """Write a sound copy and say what was set aside.
+
+    Raises:
+        ConfigError: `target` is in use, or the format has no repair.
+        PoolError: the source cannot be repaired.
+    """
+    from teasim.common.errors import ConfigError
     from teasim.pool.readers import lerobot
+    from teasim.pool.readers.registry import reader_of
+    from teasim.pool.repair import SET_ASIDE, repair_pool
 
-    return getattr(reader, "check", check_pool if reader == lerobot.READER else None)
+    reader = reader_of(settings.source)
+    if reader is not lerobot.READER:
+        raise ConfigError(
+            f"'{settings.source}' is of the format {reader.name}; --repair works on a "
+            f"{lerobot.READER.name} only."
+        )
+    done = repair_pool(settings.source, target)
+    for index, reasons in done.set_aside.items():
+        print("\n".join(f"Demonstration {index}: {reason}" for reason in reasons))
+    print(f"{len(done.kept)} sound demonstrations are in {done.root}, numbered from 0.")
+    if done.set_aside:
+        print(f"{len(done.set_aside)} damaged ones were set aside in {done.root / SET_ASIDE}.")
+    return 0
 
 
 def _leakage(source: Source) -> dict[str, float]:

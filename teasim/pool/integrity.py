@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from teasim.common.errors import PoolError
-from teasim.pool.clips import check_decodable
+from teasim.pool.clips import check_decodable, probe
+from teasim.pool.lerobot.describing.metadata import require_pool_folder
 from teasim.pool.lerobot.episode import Episode
-from teasim.pool.lerobot.metadata import require_pool_folder
 from teasim.pool.lerobot.reader import Pool
 from teasim.pool.lerobot.soundness import Problem, sentences
 from teasim.pool.source import Clip
@@ -61,11 +61,19 @@ def _check_pictures(pool: Pool, episodes: Sequence[Episode]) -> Iterator[Problem
                 found = told[clip.path] = list(sentences(partial(_check_file, clip.path)))
             else:
                 found = told.get(clip.path, [])
+            found = found or list(sentences(partial(_check_ends, clip)))
             yield from (Problem(text, episode.index) for text in found)
 
 
 def _check_file(path: Path) -> Iterator[str]:
-    check_decodable(path)
+    decoded, stored = check_decodable(path), probe(path).n_frames
+    if decoded < stored:
+        yield f"The video '{path}' is damaged: {decoded} of its {stored} frames can be decoded."
+
+
+def _check_ends(clip: Clip) -> Iterator[str]:
+    """Are the first and the last frame found at their times?"""
+    clip.frames([0, clip.length - 1])
     yield from ()
 
 

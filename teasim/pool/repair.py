@@ -16,8 +16,8 @@ from teasim.pool.hub import located
 from teasim.pool.integrity import check_episodes, check_pool
 from teasim.pool.lerobot.episode import Episode
 from teasim.pool.lerobot.reader import Pool
-from teasim.pool.lerobot.rewriting import rewrite, write_rows
 from teasim.pool.lerobot.soundness import Problem
+from teasim.pool.lerobot.writing.rewriting import rewrite, write_rows
 
 SET_ASIDE = "damaged"
 """Folder of the copy that holds what was damaged."""

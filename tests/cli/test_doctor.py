@@ -94,7 +94,7 @@ def test_a_codec_that_is_not_read_is_told_with_the_fix(machine, capsys):
     assert "ok  h264    is read exactly" in out
     assert "--  av1     PyAV was built without its decoder" in out
     assert out.splitlines()[-1] == (
-        "To mend it, run: pip install --force-reinstall imageio-ffmpeg av"
+        "To fix it, run: pip install --force-reinstall imageio-ffmpeg av"
     )
 
 

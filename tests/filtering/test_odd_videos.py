@@ -1,6 +1,5 @@
 """Videos nobody would choose: very short, black, of an uneven rate, tiny or of an odd size."""
 
-import shutil
 from pathlib import Path
 
 import av
@@ -12,6 +11,7 @@ from filtering.demo_filter import DemoFilter
 from filtering.segmentation.config import FitConfig
 from filtering.segmentation.fit import fit_segmenter
 from filtering.segmentation.mstcn.training import MSTCNConfig
+from teasim.common.errors import PoolError
 from teasim.pool import Pool
 from tests import toy_pool
 from tests.toy_pool import SEQ_1, make_toy_pool
@@ -57,16 +57,13 @@ def test_black_videos_fit_a_segmenter_that_sees_nothing(tmp_path, monkeypatch):
     assert flagged(pool, segmenter=str(tmp_path / "s")) == [False] * 5  # all look alike
 
 
-def test_frames_are_counted_not_timed(tmp_path):
+def test_videos_whose_times_contradict_the_log_are_refused(tmp_path):
     pool = make_toy_pool(tmp_path / "pool", ONE_OF_FIVE, frames_per_subtask=3)
-    expected = DemoFilter().fit(pool).table()
-    shutil.copytree(pool.root, tmp_path / "uneven")
-    for video in (tmp_path / "uneven").rglob("*.mp4"):
+    (pool.root / "teasim/manifest.json").unlink()  # which has check sums
+    for video in pool.root.rglob("*.mp4"):
         slow_down(video)
-    uneven = DemoFilter().fit(Pool.open(tmp_path / "uneven")).table()
-    assert [(row.weight, row.flagged) for row in uneven] == [
-        (row.weight, row.flagged) for row in expected
-    ]
+    with pytest.raises(PoolError, match=r"for the whole check run: teasim inspect"):
+        DemoFilter().fit(Pool.open(pool.root))
 
 
 def slow_down(video: Path) -> None:

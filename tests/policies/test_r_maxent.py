@@ -13,7 +13,7 @@ from policies.learners.r_maxent import (
     fit_multipliers,
     solve,
 )
-from teasim.common.trust import trust
+from teasim.common.trimming import soft_trim
 from tests.policies.learning import make
 
 STATES = 5
@@ -62,7 +62,7 @@ loss_lists = arrays(float, st.integers(2, 9), elements=st.floats(0, 10))
 @given(loss_lists, st.floats(0.05, 0.95), st.floats(0.01, 1.0))
 def test_trust_sums_to_m_and_falls_with_the_loss(losses, share, temperature):
     copies = np.linspace(0.5, 2, len(losses))
-    weights = trust(losses, copies, share * copies.sum(), temperature)
+    weights = soft_trim(losses, copies, share * copies.sum(), temperature)
     assert copies @ weights == pytest.approx(share * copies.sum())
     assert ((weights >= 0) & (weights <= 1)).all()
     assert (np.diff(weights[np.argsort(losses)]) <= 1e-12).all()

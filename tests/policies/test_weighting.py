@@ -1,5 +1,7 @@
 """A weight table meets a pool: matched by demonstration, refused when it is not the pool's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -67,12 +69,16 @@ def test_a_use_without_a_table_is_refused(fake_pool):
     )
 
 
-def test_a_table_of_another_pool_is_refused(human_pool, fake_pool, rows, table):
-    path = table(rows)
-    assert sentence(human_pool, path, "weight") == (
+def test_a_table_of_another_pool_is_refused(fake_pool, rows, table):
+    path = table([replace(row, demo_id=f"v2-{place:016x}") for place, row in enumerate(rows)])
+    assert sentence(fake_pool, path, "weight") == (
         f"The weight table '{path}' is for another pool: "
-        f"it has no demonstration of '{human_pool.root}'."
+        f"it has no demonstration of '{fake_pool.root}'."
     )
+
+
+def test_a_table_fits_the_same_videos_without_the_joint_log(human_pool, rows, table):
+    np.testing.assert_array_equal(demo_weights(human_pool, table(rows), "weight"), [0.9])
 
 
 def test_a_table_that_lacks_demonstrations_is_refused(fake_pool, rows, table):

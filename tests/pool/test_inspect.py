@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from teasim.cli.inspect import main
-from teasim.common.errors import PoolError
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool
 from tests.toy_pool import SEQ_1, SEQ_2, copy_pool, make_toy_pool, strip_ground_truth
 
@@ -151,3 +151,25 @@ def test_the_verb_imports_neither_simulator_nor_torch(toy_pool: Pool) -> None:
         "assert not {'mujoco', 'gymnasium', 'torch', 'sklearn'} & set(sys.modules); sys.exit(code)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_a_repair_is_told_and_inspected_as_sound(
+    toy_pool: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = copy_pool(toy_pool, tmp_path / "copy")
+    video = root / "videos/observation.images.cup/chunk-000/file-001.mp4"
+    video.unlink()
+    assert main([str(root), "--repair", str(tmp_path / "sound")]) == 0
+    assert capsys.readouterr().out.splitlines()[-2:] == [
+        f"2 sound demonstrations are in {tmp_path}/sound, numbered from 0.",
+        f"1 damaged ones were set aside in {tmp_path}/sound/damaged.",
+    ]
+    assert main([str(tmp_path / "sound")]) == 0
+
+
+def test_only_the_native_format_is_repaired(tmp_path: Path) -> None:
+    (tmp_path / "groundTruth").mkdir()
+    (tmp_path / "mapping.txt").write_text("0 cut\n")
+    (tmp_path / "groundTruth/a.txt").write_text("cut\n")
+    with pytest.raises(ConfigError, match=r"MS-TCN folder; --repair works on a LeRobot data set"):
+        main([str(tmp_path), "--repair", str(tmp_path / "sound")])

@@ -1,6 +1,7 @@
 import contextlib
 import shutil
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from teasim.common.errors import PoolError
 from teasim.pool import Pool
 from teasim.pool.integrity import check_pool
+from tests import barcode
 from tests.toy_pool import copy_pool, make_toy_pool, rewrite_table
 
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
@@ -155,6 +157,25 @@ def test_a_video_cut_short_is_told(toy_pool: Pool, tmp_path: Path, with_manifest
         f"The video '{root / VIDEO}' is shorter than the log: it has 6 frames but demonstration 1 "
         f"ends at frame 42."
     ) in check_pool(root)
+
+
+def test_a_camera_of_half_the_rate_is_as_long_as_its_log(toy_pool: Pool, tmp_path: Path) -> None:
+    root = copy_pool(toy_pool, tmp_path / "copy")
+    (root / MANIFEST).unlink()
+    barcode.write(root / VIDEO, range(21), rate=Fraction(toy_pool.fps) / 2)
+    assert not [problem for problem in check_pool(root) if "shorter" in problem]
+    barcode.write(root / VIDEO, range(20), rate=Fraction(toy_pool.fps) / 2)
+    assert (
+        f"The video '{root / VIDEO}' is shorter than the log: it has 40 frames but demonstration 1 "
+        f"ends at frame 42."
+    ) in check_pool(root)
+
+
+def test_identities_made_from_packets_are_left_alone(toy_pool: Pool, tmp_path: Path) -> None:
+    root = copy_pool(toy_pool, tmp_path / "copy")
+    rewrite_table(root / EPISODES, set_value("teasim/demo_id", 1, "0123456789abcdef"))
+    assert check_pool(root) == []
+    assert Pool.open(root).episodes[1].demo_id == "0123456789abcdef"
 
 
 FILES = (

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from teasim.pool.lerobot.statistics import (
+from teasim.pool.lerobot.writing.statistics import (
     PIXEL_STRIDE,
     QUANTILES,
     ImageHistogram,

@@ -69,10 +69,14 @@ class Lines:
     episodes: tuple[Line, ...]
     fps: float | None = None
     cameras: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def subtasks(self):
         return tuple(dict.fromkeys(step for line in self.episodes for step in line.steps))
+
+    def problems(self):
+        return []
 
     def content_hash(self):
         return str(hash(self.root.read_text()))

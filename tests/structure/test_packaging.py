@@ -99,7 +99,10 @@ PROMISED = {"imageio", "stable-baselines3"}
 
 def test_what_is_imported_is_what_is_declared():
     extras = PROJECT["optional-dependencies"]
-    optional = {normal(Requirement(line).name) for line in extras["dask"] + extras["ray"]}
+    optional = {
+        normal(Requirement(line).name)
+        for line in [*extras["dask"], *extras["ray"], *extras["hdf5"]]
+    }
     declared = {normal(Requirement(line).name) for line in PROJECT["dependencies"]}
     owners = packages_distributions()
     used = {normal(owners.get(name, [name])[0]) for name in imported()}

@@ -7,12 +7,13 @@ container (`start_time`), an edit list or frames before time zero shift nothing.
 import bisect
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
 from teasim.common.errors import PoolError
-from teasim.pool.clips.order import check_size
+from teasim.pool.clips.order import check_size, file_version
 
 HALF = 0.55
 """Share of the gap between two frames after which the later one is taken.
@@ -138,7 +139,7 @@ def nearest_frames(path: Path, times: Sequence[float]) -> Iterator[Any]:
         PoolError: The file is missing, is no video, or is damaged.
     """
     with Video(path) as video, damage_told(path):
-        keys = video.key_times()
+        keys = _key_times(path, *file_version(path, "video"))
         run: Iterator[tuple[float, Any]] = iter(())
         before: tuple[float, Any] | None = None
         after: tuple[float, Any] | None = None
@@ -149,6 +150,14 @@ def nearest_frames(path: Path, times: Sequence[float]) -> Iterator[Any]:
             while after is not None and after[0] <= time:
                 before, after = after, next(run, None)
             yield None if before is None else _nearer(video, before, after, time)
+
+
+@lru_cache(maxsize=32)
+def _key_times(path: Path, mtime_ns: int, size: int) -> list[float]:
+    """Return `Video.key_times`, which takes longer than opening a long file."""
+    del mtime_ns, size
+    with Video(path) as video:
+        return video.key_times()
 
 
 def _skips(video: Video, keys: list[float], position: float, time: float) -> bool:

@@ -132,7 +132,7 @@ def whole_numbers(column: pa.ChunkedArray, name: str) -> np.ndarray:
     if values.dtype.kind == "b":
         raise PoolError(f"The column '{name}' does not hold one number per row.")
     if values.dtype.kind == "f":
-        wrong = ~(np.abs(values) <= MOST_WHOLE) | (values != np.floor(values))
+        wrong = ~(np.abs(values) <= MOST_WHOLE) | (values != np.trunc(values))
         if wrong.any():
             raise PoolError(f"The column '{name}' holds {values[wrong][0]}, no whole number.")
     return values.astype(np.int64)

@@ -13,12 +13,12 @@ from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, numbers, read_column, whole_numbers
+from teasim.pool.lerobot.describing.metadata import Metadata
 from teasim.pool.lerobot.identity import demo_id, halves, identifying_log
 from teasim.pool.lerobot.images import image_clip
 from teasim.pool.lerobot.labelling import Labelling
 from teasim.pool.lerobot.labels import annotated_spans, said, said_spans
 from teasim.pool.lerobot.log import Rows, rows_of
-from teasim.pool.lerobot.metadata import Metadata
 from teasim.pool.source import Clip
 from teasim.pool.types import NO_SUBTASK, GroundTruth, MistakeSpan, Span, spans_from_index
 

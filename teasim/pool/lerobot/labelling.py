@@ -10,10 +10,10 @@ import numpy as np
 from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import read_column, whole_numbers
+from teasim.pool.lerobot.describing.metadata import Metadata
+from teasim.pool.lerobot.describing.names import MOST_NAMES, in_order, names_by_number
 from teasim.pool.lerobot.labels import annotated_kind, annotated_names, said
 from teasim.pool.lerobot.log import rows_of
-from teasim.pool.lerobot.metadata import Metadata
-from teasim.pool.lerobot.names import MOST_NAMES, in_order, names_by_number
 
 
 class Labelling:

@@ -7,6 +7,7 @@ from teasim.pool.types import PoolHeader
 
 CODEBASE_VERSION = "v3.0"
 CHUNK_SIZE = 1000
+"""Files per folder, LeRobot's default."""
 
 INFO = Path("meta/info.json")
 STATS = Path("meta/stats.json")

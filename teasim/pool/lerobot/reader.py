@@ -9,9 +9,9 @@ from typing import Any, Self
 
 from teasim.pool.hub import located
 from teasim.pool.lerobot import layout
+from teasim.pool.lerobot.describing.metadata import Metadata, read_metadata
 from teasim.pool.lerobot.episode import Episode
 from teasim.pool.lerobot.labelling import Labelling
-from teasim.pool.lerobot.metadata import Metadata, read_metadata
 from teasim.pool.lerobot.soundness import Findings, look_at
 from teasim.pool.selection import lerobot_usage
 

@@ -4,6 +4,7 @@ A *problem* is damage, for which every verb refuses the data set. A *note* is un
 nothing and is printed as a warning.
 """
 
+import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -16,10 +17,10 @@ from teasim.common.errors import PoolError
 from teasim.common.files import sha256_of
 from teasim.pool.clips import probe
 from teasim.pool.lerobot.columns import as_numpy, read_columns
+from teasim.pool.lerobot.describing.metadata import Metadata, metadata_notes
+from teasim.pool.lerobot.describing.places import inside
 from teasim.pool.lerobot.episode import NOT_NUMBERS, Episode
 from teasim.pool.lerobot.log import TIME_TOLERANCE
-from teasim.pool.lerobot.metadata import Metadata, metadata_notes
-from teasim.pool.lerobot.places import inside
 
 FRAME = 0.9
 """Lengths that differ by less than this share of a frame are equal; times are rounded."""
@@ -49,7 +50,7 @@ class Findings:
 
 def look_at(meta: Metadata, episodes: Sequence[Episode]) -> Findings:
     """Hold metadata, logs and videos against each other."""
-    problems = list(_rewritten(meta, episodes))
+    problems = [*_rewritten(meta, episodes), *_too_long(meta, episodes)]
     for episode in episodes:
         for check in (_check_log, _check_labels, _check_videos):
             found = sentences(partial(check, meta, episode))
@@ -160,8 +161,8 @@ def _check_video(meta: Metadata, episode: Episode, key: str) -> Iterator[str]:
     slack = FRAME / min(fps, video.fps)  # a camera may have a rate of its own
     if last - video.duration > slack:
         yield (
-            f"The video '{path}' is shorter than the log: it has {video.n_frames} frames but "
-            f"demonstration {episode.index} ends at frame {round(last * fps)}."
+            f"The video '{path}' is shorter than the log: it has {round(video.duration * fps)} "
+            f"frames but demonstration {episode.index} ends at frame {round(last * fps)}."
         )
         return
     told = video.duration if end is None else float(end)
@@ -170,6 +171,29 @@ def _check_video(meta: Metadata, episode: Episode, key: str) -> Iterator[str]:
             f"The log of demonstration {episode.index} is shorter than its video '{path}': it ends "
             f"at frame {round(last * fps)} of {round(told * fps)}."
         )
+
+
+def _too_long(meta: Metadata, episodes: Sequence[Episode]) -> Iterator[Problem]:
+    """Does a video that holds one demonstration alone last longer than its log?
+
+    It was recorded at another rate then, and frames found by time would not be those of the log.
+    """
+    for key in meta.videos:
+        holders: dict[Path, list[Episode]] = {}
+        for episode in episodes:
+            holders.setdefault(meta.video_path(episode.row, key), []).append(episode)
+        for path, (episode, *others) in holders.items():
+            with contextlib.suppress(PoolError):  # told where each video is checked
+                video, fps = probe(path), float(meta.fps)
+                log = (
+                    float(episode.row.get(f"videos/{key}/from_timestamp", 0)) + episode.length / fps
+                )
+                if not others and video.duration - log > FRAME / min(fps, video.fps):
+                    yield Problem(
+                        f"The log of demonstration {episode.index} is shorter than its video "
+                        f"'{path}': it lasts {log:.1f} s of {video.duration:.1f} s.",
+                        episode.index,
+                    )
 
 
 def _notes(meta: Metadata, episodes: Sequence[Episode]) -> Iterator[str]:

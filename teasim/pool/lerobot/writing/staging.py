@@ -14,7 +14,7 @@ from teasim.common.errors import PoolError
 from teasim.common.files import sync, write_json
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import read_table, write_table
-from teasim.pool.lerobot.statistics import ImageHistogram
+from teasim.pool.lerobot.writing.statistics import ImageHistogram
 from teasim.pool.types import EpisodeRecord, MistakeSpan, PoolHeader, Span
 
 HEADER = "header.json"

@@ -14,14 +14,14 @@ from teasim.common.files import link_or_copy, sha256_of, sync, write_atomically,
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, write_table
 from teasim.pool.lerobot.reader import Pool
-from teasim.pool.lerobot.staging import (
+from teasim.pool.lerobot.writing.staging import (
     StagedEpisode,
     claim_folder,
     load_staged,
     record_as_json,
     staged_folder,
 )
-from teasim.pool.lerobot.statistics import (
+from teasim.pool.lerobot.writing.statistics import (
     Stats,
     column_stats,
     flatten,
@@ -31,6 +31,7 @@ from teasim.pool.types import NO_SUBTASK, PoolHeader
 
 MANIFEST_FORMAT = "teasim-pool"
 MANIFEST_VERSION = 1
+"""Version of the form of the manifest."""
 MISTAKES_TYPE = pa.list_(
     pa.struct(
         [

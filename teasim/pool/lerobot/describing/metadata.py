@@ -8,16 +8,16 @@ from typing import Any
 
 from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
-from teasim.pool.lerobot.cameras import camera_keys, depth_keys
-from teasim.pool.lerobot.documents import read_json, read_lines
-from teasim.pool.lerobot.episode_table import (
+from teasim.pool.lerobot.describing.cameras import camera_keys, depth_keys
+from teasim.pool.lerobot.describing.documents import read_json, read_lines
+from teasim.pool.lerobot.describing.episode_table import (
     EpisodeTable,
     Row,
     read_json_episodes,
     read_parquet_episodes,
 )
-from teasim.pool.lerobot.names import names_by_number
-from teasim.pool.lerobot.places import filled, inside
+from teasim.pool.lerobot.describing.names import names_by_number
+from teasim.pool.lerobot.describing.places import filled, inside
 
 FASTEST = 1e6
 """No data set has more frames per second."""

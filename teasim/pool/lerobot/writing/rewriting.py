@@ -14,9 +14,9 @@ import pyarrow.compute as pc
 from teasim.common.files import sha256_of, write_json, write_text
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import read_table, write_table
-from teasim.pool.lerobot.documents import read_lines
+from teasim.pool.lerobot.describing.documents import read_lines
+from teasim.pool.lerobot.describing.metadata import Metadata
 from teasim.pool.lerobot.episode import Episode
-from teasim.pool.lerobot.metadata import Metadata
 from teasim.pool.lerobot.reader import Pool
 
 EPISODE_STATS_LINES = Path("meta/episodes_stats.jsonl")

@@ -13,13 +13,13 @@ from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip, VideoWriter
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.identity import demo_id
-from teasim.pool.lerobot.staging import (
+from teasim.pool.lerobot.writing.staging import (
     StagedEpisode,
     claim_folder,
     save_staged,
     staged_folder,
 )
-from teasim.pool.lerobot.statistics import FRAME_STRIDE, ImageHistogram
+from teasim.pool.lerobot.writing.statistics import FRAME_STRIDE, ImageHistogram
 from teasim.pool.types import NO_SUBTASK, EpisodeRecord, PoolHeader, index_from_spans
 
 

@@ -14,7 +14,7 @@ import pyarrow as pa
 from teasim.common.errors import PoolError
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import numbers, read_table, whole_numbers
-from teasim.pool.lerobot.documents import read_lines
+from teasim.pool.lerobot.describing.documents import read_lines
 
 Row = Mapping[str, Any]
 """A demonstration's row of the episodes table, without its statistics."""

@@ -1,0 +1,1 @@
+"""What a data set says about itself: info.json, its demonstrations, names, cameras and paths."""
