@@ -131,7 +131,9 @@ def _filter(command: FilterCommand) -> int:
     print_notes(pool)
     check_output(command.out, pool.root, overwrite=command.overwrite)
     fitted = DemoFilter(command.config).fit(pool, workers=command.workers)
-    write_filter_output(command.out, pool, fitted, overwrite=command.overwrite)
+    write_filter_output(
+        command.out, pool, fitted, overwrite=command.overwrite, workers=command.workers
+    )
     _print_result(pool, fitted)
     page = command.out / "report.html"
     print(f"report: {page}" if page.exists() else f"weights: {command.out / 'weights.csv'}")
@@ -141,6 +143,7 @@ def _filter(command: FilterCommand) -> int:
 def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
     from filtering.demo_filter import caution
 
+    print(f"cameras looked at: {', '.join(fitted.looked_at_) or 'none'}")
     confidence = fitted.segments_.confidence()
     if confidence is not None:
         found = len(fitted.segments_.subtasks)

@@ -90,6 +90,7 @@ from the whole video.
         segments_: the segments used.
         cameras_: cameras used for segments and states; effects use all cameras of the pool unless
             some are named.
+        looked_at_: cameras whose pictures were looked at.
         timings_: seconds per stage.
     """
 
@@ -106,6 +107,7 @@ from the whole video.
     objective_: float | None
     segments_: Segmentation
     cameras_: tuple[str, ...]
+    looked_at_: tuple[str, ...]
     timings_: dict[str, float]
 
     def __init__(self, config: FilterConfig | None = None) -> None:
@@ -130,8 +132,10 @@ from the whole video.
         self.cameras_ = self._cameras(pool)
         with self._timed("segments"):
             self.segments_ = self._segments(pool, workers)
+        self._seen = set(self.segments_.cameras)
         with self._timed("features"):
             evidence = self._evidence(pool, workers)
+        self.looked_at_ = tuple(camera for camera in pool.cameras if camera in self._seen)
         # The matrices are small: several BLAS threads would only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
             self._learn(judge_named(self.config.score)(evidence, self.config))
@@ -200,6 +204,7 @@ from the whole video.
     ) -> list[NDArray[np.float64]]:
         """Return per demonstration (q,): how surprisingly little each segment changed [nats]."""
         source = FrameSource(self.config.cameras or pool.cameras)
+        self._seen.update(source.cameras)
         rests = look_at_rests(
             pool.episodes, self.segments_.spans, frame_rate(pool), source, workers=workers
         )
@@ -216,7 +221,9 @@ from the whole video.
             from filtering.features.checkpoint import load_features
 
             learned = load_features(Path(self.config.features))
+            self._seen.add(learned.look.camera)
             return reduce_features(learned.describe(pool, spans, workers=workers))
+        self._seen.update(self.cameras_)
         features = segment_features(
             pool,
             spans,

@@ -26,7 +26,7 @@ from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder
 from teasim.common.workers import Workers
 from teasim.pool import Pool
-from teasim.pool.soundness import require_sound
+from teasim.pool.soundness import print_notes, require_sound
 
 RECORDED = ("learner", "level", "observe", "camera", "expert", "seed")
 """Settings that are stored with a policy as they were given."""
@@ -98,6 +98,7 @@ def train(settings: TrainSettings) -> Training:
     demos = DemosConfig(observe=settings.observe, cameras=settings.camera)
     pool = Pool.open(settings.pool)
     require_sound(pool)
+    print_notes(pool)
     weights = demo_weights(pool, settings.weights, settings.chosen_use)
     options |= provide(kind, pool, settings)
     check_new_folder(settings.out)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.vision.cache import ArrayCache, default_folder
+from filtering.vision.cache import default_folder
 from filtering.vision.frame_features import (
     FrameSource,
     clip_key,
@@ -39,6 +39,8 @@ class RestTask:
 
     clip: Clip
     """Where the frames are."""
+    camera: str
+    """Name of the camera."""
     frames: tuple[int, ...]
     """Numbers of the frames, in order."""
     cache_folder: Path
@@ -88,7 +90,7 @@ def look_at_rests(
         places.append([np.searchsorted(used, numbers) for numbers in chosen])
         for camera in source.cameras:
             seen = tuple(frames[used].tolist())
-            tasks.append(RestTask(episode.clip(camera), seen, default_folder()))
+            tasks.append(RestTask(episode.clip(camera), camera, seen, default_folder()))
     described = look_up_or_describe(tasks, _key, describe_rests, workers)
     videos = side_by_side(described, len(source.cameras))
     return [_means(moments, chosen) for moments, chosen in zip(videos, places, strict=True)]
@@ -124,10 +126,8 @@ def rest_moments(
 
 
 def describe_rests(task: RestTask) -> NDArray[np.float32]:
-    """Return the features (n, F) of the frames of `task`, and cache them."""
-    features = describe_clip(task.clip, np.array(task.frames))
-    ArrayCache(task.cache_folder).put(_key(task), features)
-    return features
+    """Return the features (n, F) of the frames of `task`."""
+    return describe_clip(task.clip, np.array(task.frames))
 
 
 def _means(

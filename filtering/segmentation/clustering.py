@@ -74,7 +74,10 @@ def clustering(
         spans[number] = spans_of(found.labels[place][nearest], posteriors[number], names)
     numbers = range(len(order))
     return Segmentation(
-        names, tuple(spans[n] for n in numbers), tuple(posteriors[n] for n in numbers)
+        names,
+        tuple(spans[n] for n in numbers),
+        tuple(posteriors[n] for n in numbers),
+        cameras=source.cameras,
     )
 
 

@@ -23,7 +23,7 @@ from teasim.common.errors import ConfigError, PoolError
 from teasim.common.files import check_new_folder
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.readers.registry import open_source
-from teasim.pool.soundness import require_sound
+from teasim.pool.soundness import print_notes, require_sound
 from teasim.pool.source import Demonstration, Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
@@ -63,6 +63,7 @@ def fit_segmenter(
     pool = open_source(source)
     check_new_folder(out)
     require_sound(pool)
+    print_notes(pool)
     frames = FrameSource(chosen_cameras(pool, config.cameras) or pool.cameras, config.rate)
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))

@@ -13,7 +13,7 @@ from teasim.common.files import check_new_folder, write_json
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
 from teasim.pool.readers.registry import open_source
-from teasim.pool.soundness import require_sound
+from teasim.pool.soundness import print_notes, require_sound
 from teasim.pool.source import Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
@@ -52,6 +52,7 @@ def _predict_pool(
     segmenter: MSTCNSegmenter, pool: Source, out: Path, workers: Workers
 ) -> ScoresByPart:
     require_sound(pool)
+    print_notes(pool)
     found = segmenter.segment(pool, workers=workers)
     assert found.posteriors is not None
     scores = score_episodes(pool.episodes, found)

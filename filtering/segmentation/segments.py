@@ -29,6 +29,8 @@ class Segmentation:
     a row is the probability of no sub-task. None where segments were given, not inferred."""
     labelled: frozenset[str] = frozenset()
     """demo_id of the demonstrations whose true labels the segmenter was fitted to."""
+    cameras: tuple[str, ...] = ()
+    """Cameras whose pictures were looked at; empty where segments were given."""
     weights_sha256: str | None = None
     """Hash of the weights of the segmenter; None where segments were given."""
 

@@ -177,7 +177,7 @@ def write_report(path: Path, pool: Pool, fitted: DemoFilter, result: DemoResult)
     """Write the filter's report with a section on the scores of the policies."""
     render_report(
         path,
-        demos=demo_views(pool, fitted),
+        demos=demo_views(pool, fitted, path.parent),
         threshold=fitted.threshold_,
         subtasks=fitted.segments_.subtasks,
         sections=[ReportSection("What that does to a policy", score_section(result.scores))],

@@ -71,6 +71,7 @@ class MSTCNSegmenter:
             spans=tuple(spans for spans, _ in described),
             posteriors=tuple(posteriors for _, posteriors in described),
             labelled=self.labelled,
+            cameras=self.source.cameras,
             weights_sha256=hashlib.sha256(self.weights()).hexdigest(),
         )
 
