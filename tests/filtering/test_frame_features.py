@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from filtering.vision import frame_features as module
+from filtering.vision import frames
 from filtering.vision.backbone import FRAME_FEATURES, describe_frames
 from filtering.vision.frame_features import (
     FrameSource,
@@ -60,6 +61,29 @@ def test_features_of_all_cameras_stand_side_by_side(toy_pool: Pool):
         expected = describe_frames(episode.clip(camera).frames(moments))
         part = found[:, place * FRAME_FEATURES : (place + 1) * FRAME_FEATURES]
         np.testing.assert_array_equal(part, expected)
+
+
+def test_the_progress_names_the_camera(toy_pool: Pool, monkeypatch, tmp_path):
+    monkeypatch.setenv("TEASIM_CACHE", str(tmp_path))
+    told: list[str] = []
+
+    def run(function, items, *, workers, description):
+        told.append(f"{description}: {len(items)}")
+        return [function(item) for item in items]
+
+    monkeypatch.setattr(module.parallel, "run", run)
+    source = FrameSource(("cup", "left"), 1.0)
+    frame_features(toy_pool.episodes[:2], toy_pool.fps, source, workers=IN_PROCESS)
+    assert told == ["looking at cup: 2", "looking at left: 2"]
+
+
+def test_frames_are_shrunk_one_by_one(toy_pool: Pool, monkeypatch):
+    clip = toy_pool.episodes[0].clip("left")
+    monkeypatch.setattr(frames, "LARGEST_SIDE", 20)
+    wanted = np.arange(0, clip.length, 5)
+    found = list(frames.fitted_frames(clip, wanted))
+    assert {image.shape for image in found} == {(1, 20, 20, 3)}
+    assert np.array_equal(np.concatenate(found), frames.fit_size(clip.frames(wanted)))
 
 
 def test_features_are_looked_up_and_depend_on_no_chunk(toy_pool: Pool, monkeypatch, tmp_path):
