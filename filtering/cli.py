@@ -140,9 +140,24 @@ def _filter(command: FilterCommand) -> int:
     return 1 if float(fitted.flagged_.mean()) > command.max_flagged else 0
 
 
+def basis(fitted: "DemoFilter") -> str:
+    """Return a sentence on what the demonstrations were judged by."""
+    chosen, cameras = fitted.chosen_, ", ".join(fitted.cameras_)
+    if chosen.score == "moments":
+        return f"Judged by moments of the videos alone (camera {cameras})."
+    if chosen.segmenter == "logged":
+        return "Judged by the logged sub-tasks."
+    if chosen.segmenter == "predictions":
+        return "Judged by the predictions stored in the folder."
+    if chosen.segmenter == "clustering":
+        return f"Judged by sub-tasks found in the videos alone (camera {cameras})."
+    return f"Judged by sub-tasks that the segmenter '{chosen.segmenter}' found in the videos."
+
+
 def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
     from filtering.demo_filter import caution
 
+    print(basis(fitted))
     print(f"cameras looked at: {', '.join(fitted.looked_at_) or 'none'}")
     confidence = fitted.segments_.confidence()
     if confidence is not None:

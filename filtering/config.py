@@ -1,6 +1,6 @@
 """Settings of the filter; light, so that `teasim filter --help` is fast."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +9,7 @@ import tyro
 from filtering.features.config import POOLED
 from filtering.judging.config import JudgingConfig
 from teasim.common.errors import ConfigError
+from teasim.pool.source import Source
 
 Cameras = Annotated[
     tuple[str, ...], tyro.conf.arg(name="camera", metavar="NAME"), tyro.conf.UseAppendAction
@@ -16,14 +17,24 @@ Cameras = Annotated[
 """Names of cameras; on the command line `--camera NAME`, which may be repeated."""
 
 
+AUTO = "auto"
+"""Name of the score and of the segmenter that are chosen by what the source holds."""
+MOMENTS = "moments"
+"""Name of the score that needs no segments."""
+AGREEMENT = "agreement"
+"""Name of the segmenter that the score `moments` brings along."""
+
+
 @dataclass(frozen=True)
 class FilterConfig(JudgingConfig):
     """How a pool is filtered."""
 
-    segmenter: str = "logged"
-    """Source of the segments: logged (sub-tasks logged in the pool), clustering (the videos alone,
-    without labels), predictions (stored in an MS-TCN folder), or a folder that `teasim segment fit`
-    made. Only logged reads logged labels."""
+    segmenter: str = "auto"
+    """Source of the segments: agreement (what the counterparts of the score moments agree on),
+    clustering (the videos alone, without labels), logged (sub-tasks logged in the pool),
+    predictions (stored in an MS-TCN folder), or a folder that `teasim segment fit` made. Only
+    logged reads logged labels. auto: the videos alone; for step lists without videos the stored
+    predictions, or else the logged labels."""
     subtasks: str = "auto"
     """Number of sub-tasks for the segmenter clustering; auto infers it."""
     cameras: Cameras = ()
@@ -54,6 +65,25 @@ class FilterConfig(JudgingConfig):
         if self.score != "equation3" and self.features != POOLED:
             raise ConfigError(f"The score '{self.score}' takes no features; choose equation3.")
 
+    def for_source(self, source: Source) -> "FilterConfig":
+        """Return these settings with `auto` replaced by what it stands for in a source.
+
+        Videos are judged by moments unless a setting is about segments; step lists without videos
+        by the score norm, from the predictions that are stored or else from the logged labels.
+        """
+        about_segments = self.precedence or self.tolerance or self.subtasks != AUTO
+        score, segmenter = self.score, self.segmenter
+        if score == AUTO:
+            by_moments = segmenter in (AUTO, AGREEMENT) and source.cameras and not about_segments
+            score = MOMENTS if by_moments else "norm"
+        if segmenter == AUTO and score == MOMENTS:
+            segmenter = AGREEMENT
+        elif segmenter == AUTO and source.cameras:
+            segmenter = "clustering"
+        elif segmenter == AUTO:
+            segmenter = "predictions" if source.has_predictions else "logged"
+        return replace(self, score=score, segmenter=segmenter)
+
     def _check_names(self) -> None:
         # Imported here because the registries need SciPy, which `--help` must not wait for.
         from filtering.judging.equation3.solvers import solver_named
@@ -62,8 +92,14 @@ class FilterConfig(JudgingConfig):
         from filtering.segmentation.segmenter import segmenter_named
         from filtering.vision.background import subtraction_named
 
-        segmenter_named(self.segmenter, self.subtasks)
-        judge_named(self.score)
+        if self.segmenter not in (AUTO, AGREEMENT):
+            segmenter_named(self.segmenter, self.subtasks)
+        if self.segmenter == AGREEMENT and self.score not in (AUTO, MOMENTS):
+            raise ConfigError(
+                f"The segmenter '{AGREEMENT}' is for the score '{MOMENTS}'; choose another one."
+            )
+        if self.score not in (AUTO, MOMENTS):
+            judge_named(self.score)
         solver_named(self.solver)
         subtraction_named(self.background)
         if self.features != POOLED and not Path(self.features).is_dir():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.config import FilterConfig
+from filtering.config import AGREEMENT, MOMENTS, FilterConfig
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.features.config import POOLED
@@ -19,7 +19,8 @@ from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
 from filtering.judging.evidence import Evidence
 from filtering.judging.explain import Finding, explain
-from filtering.judging.judges import Judgement, judge_named
+from filtering.judging.judgement import Judgement
+from filtering.judging.judges import judge_named
 from filtering.judging.thresholds import probability_incorrect
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
@@ -87,7 +88,8 @@ from the whole video.
         threshold_: weight below which a demonstration is flagged; 0 when there is none.
         trust_ (D,): influence on the norm, in [0, 1]; w of equation 3, of sum M.
         objective_: value of equation 3 [nats per step]; None for another score.
-        segments_: the segments used.
+        segments_: the segments used, or those shown with the score moments.
+        chosen_: the settings with `auto` replaced by what it stands for in this pool.
         cameras_: cameras used for segments and states; effects use all cameras of the pool unless
             some are named.
         looked_at_: cameras whose pictures were looked at.
@@ -106,6 +108,7 @@ from the whole video.
     trust_: NDArray[np.float64]
     objective_: float | None
     segments_: Segmentation
+    chosen_: FilterConfig
     cameras_: tuple[str, ...]
     looked_at_: tuple[str, ...]
     timings_: dict[str, float]
@@ -129,20 +132,12 @@ from the whole video.
         self.timings_ = {}
         self._check(pool)
         require_sound(pool)
+        self.chosen_ = self.config.for_source(pool)
         self.cameras_ = self._cameras(pool)
-        with self._timed("segments"):
-            self.segments_ = self._segments(pool, workers)
-        self._seen = set(self.segments_.cameras)
-        with self._timed("features"):
-            evidence = self._evidence(pool, workers)
+        judge = self._by_moments if self.chosen_.score == MOMENTS else self._by_segments
+        self._seen: set[str] = set()
+        self._learn(judge(pool, workers), pool.fps)
         self.looked_at_ = tuple(camera for camera in pool.cameras if camera in self._seen)
-        # The matrices are small: several BLAS threads would only wait for each other.
-        with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
-            self._learn(judge_named(self.config.score)(evidence, self.config))
-        self.reasons_ = tuple(
-            explain(found, pool.fps) if flagged else ""
-            for found, flagged in zip(self.findings_, self.flagged_, strict=True)
-        )
         self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
         return self
 
@@ -186,14 +181,48 @@ from the whole video.
                 )
         return ()
 
+    def _by_moments(self, pool: Source, workers: Workers) -> Judgement:
+        """Judge by counterparts between the videos; segments only serve to show."""
+        # Imported here because step lists need neither torch nor videos.
+        from filtering.judging.moments import Timeline, judge_moments
+        from filtering.moments.score import look
+        from filtering.segmentation.agreed import agreed_segments
+
+        self._seen.update(self.cameras_)
+        with self._timed("features"):
+            seen = look(pool, pool.episodes, self.cameras_, workers=workers)
+        episodes = pool.episodes
+        timeline = Timeline([e.length for e in episodes], [e.name for e in episodes], pool.fps)
+        with self._timed("weights"):
+            judgement, score = judge_moments(seen, timeline, self.config.groups)
+        with self._timed("segments"):
+            if self.chosen_.segmenter == AGREEMENT:
+                self.segments_ = agreed_segments(score.counterparts, timeline.lengths)
+            else:
+                self.segments_ = self._segments(pool, workers)
+        return judgement
+
+    def _by_segments(self, pool: Source, workers: Workers) -> Judgement:
+        """Judge by the sub-tasks and what is seen of them."""
+        with self._timed("segments"):
+            self.segments_ = self._segments(pool, workers)
+        with self._timed("features"):
+            evidence = self._evidence(pool, workers)
+        # The matrices are small: several BLAS threads would only wait for each other.
+        with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
+            return judge_named(self.chosen_.score)(evidence, self.chosen_)
+
     def _segments(self, pool: Source, workers: Workers) -> Segmentation:
-        segmenter = segmenter_named(self.config.segmenter, self.config.subtasks, self.cameras_)
-        return segmenter(pool, workers=workers)
+        chosen = self.chosen_
+        segmenter = segmenter_named(chosen.segmenter, chosen.subtasks, self.cameras_)
+        found = segmenter(pool, workers=workers)
+        self._seen.update(found.cameras)
+        return found
 
     def _evidence(self, pool: Source, workers: Workers) -> Evidence:
         """Return the evidence that the score uses."""
         known = Evidence(self.segments_.subtasks, self.segments_.spans)
-        if self.config.score == "equation3":
+        if self.chosen_.score == "equation3":
             return replace(known, states=self._states(pool, workers))
         if self.config.effects and pool.cameras:
             return replace(known, ineffective=self._ineffective(pool, known, workers))
@@ -234,7 +263,7 @@ from the whole video.
         )
         return reduce_features(features)
 
-    def _learn(self, judgement: Judgement) -> None:
+    def _learn(self, judgement: Judgement, fps: float | None) -> None:
         self.weights_ = judgement.weights
         self.losses_ = judgement.losses
         self.probabilities_ = probability_incorrect(judgement.losses)
@@ -245,6 +274,11 @@ from the whole video.
         self.flagged_ = judgement.grouping.flagged
         self.threshold_ = judgement.grouping.threshold
         self.findings_ = judgement.findings
+        sentences = judgement.reasons or [explain(found, fps) for found in judgement.findings]
+        self.reasons_ = tuple(
+            sentence if flagged else ""
+            for sentence, flagged in zip(sentences, self.flagged_, strict=True)
+        )
 
     @contextmanager
     def _timed(self, stage: str) -> Iterator[None]:

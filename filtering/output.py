@@ -126,6 +126,8 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
     """Return the content of filter.json, sufficient to repeat the run and to check its result."""
     return {
         "config": asdict(fitted.config),
+        "score": fitted.chosen_.score,
+        "segmenter": fitted.chosen_.segmenter,
         "pool": str(pool.root),
         "pool_hash": pool.content_hash(),
         "versions": _versions(),

@@ -23,9 +23,10 @@ PRECEDENCE_FILE = PrimitiveConstructorSpec(
 class JudgingConfig:
     """How the segments of a pool become weights and groups."""
 
-    score: str = "norm"
-    """What demonstrations are judged by: norm (omissions, order and next steps, compared with what
-    most of the pool does) or equation3 (the next-step model of the paper)."""
+    score: str = "auto"
+    """What demonstrations are judged by: moments (where each moment of a video has its counterpart
+    in the others; needs no sub-tasks), norm (omissions, order and next steps, compared with what
+    most of the pool does) or equation3 (the next-step model of the paper). auto: see README."""
     groups: str = "auto"
     """Number of groups: auto (kept; with the score norm also out of order and steps left out), 1
     (nothing is flagged), 2 or 3."""
@@ -60,7 +61,7 @@ class JudgingConfig:
             )
         if not 0.0 < self.ridge < math.inf:
             raise ConfigError(f"ridge is {self.ridge}; choose a number above 0.")
-        if self.score != "norm" and (self.precedence or self.tolerance):
+        if self.score not in ("auto", "norm") and (self.precedence or self.tolerance):
             raise ConfigError(
                 f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
             )

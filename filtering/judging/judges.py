@@ -6,7 +6,6 @@
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -18,36 +17,18 @@ from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.solvers import solver_named
 from filtering.judging.equation3.surprises import find_surprises
 from filtering.judging.evidence import Evidence
-from filtering.judging.explain import Finding
+from filtering.judging.judgement import Judgement
 from filtering.judging.norm.cut import decide
 from filtering.judging.norm.departures import find_departures
 from filtering.judging.norm.norm_score import NormScore, score_steps
 from filtering.judging.norm.precedence import precedence_graph
-from filtering.judging.thresholds import Grouping, group_weights
+from filtering.judging.thresholds import group_weights
 from teasim.common.arrays import Array
 from teasim.common.registry import named
 
 INEFFECTIVE_PRIOR = 1.0
 """Log-odds against an ineffective step before the video is examined [nats]. A round number, odds of
 e to 1; detection with it is reported for rendered tea pools in docs/results.md."""
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """The result of judging the demonstrations of a pool."""
-
-    losses: Array
-    """(D,) surprise [nats], higher is worse."""
-    weights: Array
-    """(D,) in [0, 1], 1 for a usual demonstration."""
-    grouping: Grouping
-    """Groups and threshold on the weights."""
-    trust: Array
-    """(D,) how much each demonstration shapes the norm, in [0, 1]."""
-    findings: tuple[tuple[Finding, ...], ...]
-    """Per demonstration its unusual places, the most important one first."""
-    objective: float | None = None
-    """Value of equation 3 [nats per step]; None for another score."""
 
 
 Judge = Callable[[Evidence, JudgingConfig], Judgement]

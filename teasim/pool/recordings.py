@@ -96,6 +96,8 @@ class RecordedSource:
     """Names of the logged sub-tasks; empty without labels."""
     notes: tuple[str, ...] = ()
     """Sentences on what is unusual but harms no demonstration."""
+    has_predictions: bool = False
+    """No predictions are stored."""
 
     def problems(self) -> list[str]:
         """Return nothing: opening has found what shows without decoding a picture."""

@@ -136,6 +136,11 @@ class SequencePool:
                 found.append(str(error))
         return found
 
+    @property
+    def has_predictions(self) -> bool:
+        """Whether predictions are stored for every video."""
+        return all(e.demo_id in e.folder.prediction_files for e in self.episodes)
+
     def content_hash(self) -> str:
         """Return a SHA-256 over the names and labels of all videos."""
         digest = hashlib.sha256("\n".join(self.subtasks).encode())

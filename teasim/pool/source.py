@@ -140,6 +140,10 @@ class Source(Protocol):
         """Names of the logged sub-tasks in the order of their numbers; empty without labels."""
 
     @property
+    def has_predictions(self) -> bool:
+        """Whether a segmenter stored the spans of every demonstration in the source."""
+
+    @property
     def episodes(self) -> Sequence[Demonstration]:
         """The demonstrations in the order of their index."""
 

@@ -45,9 +45,9 @@ def stored_features(monkeypatch: pytest.MonkeyPatch) -> None:
     """Demos bring their features with them."""
     real = module.frame_features
 
-    def of_demos(episodes, fps, source, *, jobs):
+    def of_demos(episodes, fps, source, *, workers):
         if isinstance(episodes[0], Episode):
-            return real(episodes, fps, source, jobs=jobs)
+            return real(episodes, fps, source, workers=workers)
         return [np.tile(demo.features, (1, len(source.cameras))) for demo in episodes]
 
     monkeypatch.setattr(module, "frame_features", of_demos)

@@ -20,7 +20,7 @@ def settings(out):
     return DemoSettings(out=out, seq1=6, seq3=2, episodes=2, environment=world, workers=IN_PROCESS)
 
 
-def fake_generate(path, config, jobs):
+def fake_generate(path, config):
     sequences = [SEQ_1] * config.seq1 + [WITHOUT_TEA_BAG] * config.seq3
     return make_fake_pool(path, sequences, seed=config.seed)
 

@@ -70,6 +70,7 @@ class Lines:
     fps: float | None = None
     cameras: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    has_predictions: bool = False
 
     @property
     def subtasks(self):

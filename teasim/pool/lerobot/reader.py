@@ -91,6 +91,11 @@ class Pool:
         named = isinstance(names, list) and len(names) == width
         return tuple(map(str, names)) if named else tuple(f"state_{i}" for i in range(width))
 
+    @property
+    def has_predictions(self) -> bool:
+        """A data set stores no predictions."""
+        return False
+
     def findings(self) -> Findings:
         """Return what shows without decoding a picture; the logs are read for it once."""
         return self._findings

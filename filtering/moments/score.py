@@ -1,0 +1,151 @@
+"""Judge the demonstrations of a pool by moments of their videos, without labels or sub-tasks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from filtering.moments.cells import cell_pictures
+from filtering.moments.counterparts import Counterparts, find_counterparts
+from filtering.moments.decision import CUT, KINDS, exceedances, losses_of, telling
+from filtering.moments.effects import ineffective
+from filtering.moments.evidence import Evidence, Stretch, extra, missing_and_order
+from filtering.moments.suitable import (
+    LEAST_RETURN,
+    check_videos,
+    sees_motion,
+    shared_structure,
+)
+from filtering.moments.vectors import Video, moment_vectors
+from filtering.vision.frame_features import FrameSource, frame_features
+from filtering.vision.frames import frame_rate
+from teasim.common.errors import ConfigError
+from teasim.common.workers import Workers
+from teasim.pool.source import Demonstration, Source
+
+RATE = 5.0
+"""Moments looked at per second [Hz]."""
+NOTABLE = 3.0
+"""Exceedance from which a kind of evidence is a finding, unless there is no larger one."""
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MomentFinding:
+    """One kind of evidence against a demonstration, and where it is seen."""
+
+    kind: str
+    """One of `decision.KINDS`."""
+    camera: str
+    """Camera that shows it best."""
+    own: Stretch
+    """Where in the demonstration: the stretch itself, or where what is missing was expected."""
+    other: Stretch
+    """The same stretch in another video, where it is as usual."""
+    surprise: float
+    """What it adds to the loss [nats]."""
+
+
+@dataclass(frozen=True)
+class MomentScore:
+    """What moments say about D demonstrations."""
+
+    losses: Array
+    """(D,) [nats], higher is worse."""
+    exceeded: Mapping[str, Array]
+    """Per kind (D,) how far its evidence lies above what is usual [standard deviations]."""
+    findings: tuple[tuple[MomentFinding, ...], ...]
+    """Per demonstration what speaks against it, the gravest first."""
+    counterparts: Mapping[str, Counterparts]
+    """Per camera that was of use."""
+    structure: Mapping[str, float]
+    """Per camera how much the videos have in common, see `suitable.shared_structure`."""
+
+    @property
+    def flagged(self) -> NDArray[np.bool_]:
+        """(D,) True where the loss is above the cut."""
+        return self.losses > CUT
+
+
+def look(
+    pool: Source, episodes: Sequence[Demonstration], cameras: Sequence[str], *, workers: Workers
+) -> dict[str, list[Video]]:
+    """Return per camera what it saw of each of `episodes`; cached.
+
+    Raises:
+        ConfigError: the frame rate of the pool is not known.
+        PoolError: a video is missing or damaged, or there is no such camera.
+    """
+    fps, seen = frame_rate(pool), {}
+    for camera in cameras:
+        source = FrameSource((camera,), RATE)
+        looks = frame_features(episodes, fps, source, workers=workers)
+        cells = cell_pictures(episodes, fps, source, workers=workers)
+        seen[camera] = [Video(*both) for both in zip(looks, cells, strict=True)]
+    return seen
+
+
+def score_moments(cameras: Mapping[str, Sequence[Video]]) -> MomentScore:
+    """Judge demonstrations by what each of one or more cameras saw of them.
+
+    Args:
+        cameras: per camera the videos of the D demonstrations.
+
+    Raises:
+        ConfigError: there are fewer than three videos, they are too short, no camera sees anything
+            happen, or the videos do not show one task.
+    """
+    check_videos(dict(cameras))
+    moving = {camera: videos for camera, videos in cameras.items() if sees_motion(videos)}
+    if not moving:
+        raise ConfigError(
+            f"Nothing happens in the pictures of {', '.join(cameras)}; name a camera that sees "
+            "the task."
+        )
+    # The matrices are small: more BLAS threads only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = {name: find_counterparts(moment_vectors(seen)) for name, seen in moving.items()}
+        structure = {camera: shared_structure(one) for camera, one in found.items()}
+        useful = {c: one for c, one in found.items() if structure[c] >= LEAST_RETURN}
+        if not useful:
+            raise ConfigError(
+                "These videos do not show one task: most of their moments have no counterpart in "
+                "the other videos; filter the videos of one task at a time."
+            )
+        evidence = {camera: gather(one, moving[camera]) for camera, one in useful.items()}
+    return _judged(evidence, useful, structure)
+
+
+def gather(found: Counterparts, videos: Sequence[Video]) -> dict[str, Evidence]:
+    """Return the evidence of every kind that one camera gives."""
+    missing, order = missing_and_order(found)
+    kinds = (missing, order, extra(found), ineffective(found, videos))
+    return dict(zip(KINDS, kinds, strict=True))
+
+
+def _judged(
+    evidence: Mapping[str, Mapping[str, Evidence]],
+    found: Mapping[str, Counterparts],
+    structure: Mapping[str, float],
+) -> MomentScore:
+    """Put cameras and kinds together."""
+    cameras = list(evidence)
+    exceeded: dict[str, Array] = {}
+    chosen: dict[str, NDArray[np.int64]] = {}
+    for kind in KINDS:
+        each = [exceedances(kind, evidence[camera][kind].values) for camera in cameras]
+        exceeded[kind], chosen[kind] = np.max(each, axis=0), telling(each)
+    findings = []
+    for d in range(len(next(iter(exceeded.values())))):
+        said = []
+        for kind in KINDS:
+            camera, z = cameras[chosen[kind][d]], float(exceeded[kind][d])
+            one = evidence[camera][kind]
+            said.append(MomentFinding(kind, camera, one.own[d], one.other[d], z**2 / 2))
+        said.sort(key=lambda finding: -finding.surprise)
+        grave = [finding for finding in said if finding.surprise >= NOTABLE**2 / 2]
+        findings.append(tuple(grave or said[:1]))
+    return MomentScore(losses_of(exceeded), exceeded, tuple(findings), found, structure)

@@ -1,0 +1,181 @@
+"""Judge pools drawn from the scenes by moments of their videos alone, and count what is right.
+
+The truth is read for counting only. Scenes that are kept back are judged with --held-back alone,
+when everything has been chosen. A folder that make_scenes.py did not write is made first. Pools of
+mistakes have 10 usual videos and 3 of one kind of mistake; clean and free-order pools 12 videos.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scenes.registry import HELD_BACK, SCENES, TUNED_ON
+from scenes.scene import MISTAKES
+from scenes.writing import make_bank
+
+from filtering.moments.score import MomentScore, look, score_moments
+from filtering.moments.vectors import Video
+from filtering.vision.frame_features import sampled_frames
+from teasim.common.statistics import auroc
+from teasim.common.workers import Workers
+from teasim.pool import Pool
+from teasim.pool.lerobot import Episode
+
+GOOD, BAD, CLEAN = 10, 3, 12
+"""Usual and incorrect videos of a pool with mistakes, and videos of a pool without."""
+NEAR = 1.5
+"""How far a place that is named may lie from the true one [s]."""
+TEA_KINDS = {"seq_1": "usual", "legal": "free", "seq_2": "out_of_order", "seq_3": "missing"}
+"""Kind of a video of tea-making by the order of its sub-tasks."""
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Videos to draw pools from."""
+
+    name: str
+    """Of the scene."""
+    pool: Pool
+    """The pool they are from."""
+    episodes: list[Episode]
+    """The videos."""
+    seen: dict[str, list[Video]]
+    """What each camera saw."""
+    kinds: np.ndarray
+    """(n,) the kind of each."""
+
+
+class Drawn(NamedTuple):
+    """A pool that was drawn."""
+
+    kind: str
+    """Kind of its mistakes, or usual or free."""
+    videos: list[int]
+    """Numbers in the bank."""
+    bad: np.ndarray
+    """(D,) True for incorrect ones."""
+
+
+def main() -> int:
+    """Run the check."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="where the videos of the scenes are")
+    parser.add_argument("--held-back", action="store_true", help="judge the scenes kept back")
+    parser.add_argument("--scenes", nargs="+", help="names of scenes, in place of all tuned on")
+    parser.add_argument("--tea", type=Path, nargs="*", default=[], help="pools of tea-making")
+    parser.add_argument("--cameras", nargs="+", help="cameras of tea-making; default: all")
+    parser.add_argument("--pools", type=int, default=4, help="pools per scene and kind")
+    parser.add_argument("--share", type=float, default=1.0, help="share of the videos drawn from")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
+    arguments = parser.parse_args()
+    chosen = [s.name for s in (HELD_BACK if arguments.held_back else TUNED_ON)]
+    print(f"{'scene':10}{'kind':14}{'AUROC':>7}{'found':>8}{'accused':>9}{'silent':>8}{'place':>7}")
+    for name in arguments.scenes if arguments.scenes is not None else chosen:
+        pool = make_bank(
+            arguments.folder / name, SCENES[name], seed=0, workers=Workers(arguments.jobs)
+        )
+        judge(bank_of(name, pool, pool.cameras, arguments), arguments)
+    for root in arguments.tea:
+        pool = Pool.open(root)
+        judge(bank_of("tea", pool, arguments.cameras or pool.cameras, arguments), arguments)
+    return 0
+
+
+def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.Namespace) -> Bank:
+    """Look at the first videos of each kind of a pool."""
+    kinds = np.array([kind_of(episode.record) for episode in pool.episodes])
+    chosen = np.sort(
+        np.concatenate(
+            [
+                those[: round(arguments.share * len(those))]
+                for those in (np.flatnonzero(kinds == kind) for kind in np.unique(kinds))
+            ]
+        )
+    )
+    episodes = [pool.episodes[number] for number in chosen]
+    seen = look(pool, episodes, cameras, workers=Workers(arguments.jobs))
+    return Bank(name, pool, episodes, seen, kinds[chosen])
+
+
+def kind_of(record) -> str:
+    """Return the kind of a video from what is known about it."""
+    told = [m.name for m in record.mistakes if m.name in MISTAKES]
+    return told[0] if told else TEA_KINDS.get(record.sequence, record.sequence)
+
+
+def judge(bank: Bank, arguments: argparse.Namespace) -> None:
+    """Print one line per kind of pool."""
+    rows: dict[str, list[dict[str, float]]] = {}
+    for drawn in draw(bank.kinds, arguments.pools, arguments.seed):
+        part = {c: [seen[v] for v in drawn.videos] for c, seen in bank.seen.items()}
+        rows.setdefault(drawn.kind, []).append(count(bank, drawn, score_moments(part)))
+    for kind, counted in rows.items():
+        mean = {key: _mean([row[key] for row in counted]) for key in counted[0]}
+        if kind in ("usual", "free"):
+            line = f"{'':15}{mean['accused']:>9.2f}{mean['silent']:>8.2f}"
+        else:
+            line = (
+                f"{mean['auroc']:>7.3f}{mean['found']:>8.2f}{mean['accused']:>9.2f}{'':8}"
+                f"{mean['place']:>7.2f}"
+            )
+        print(f"{bank.name:10}{kind:14}{line}", flush=True)
+
+
+def draw(kinds: np.ndarray, pools: int, seed: int) -> Iterator[Drawn]:
+    """Draw pools of every kind there are videos of."""
+    rng = np.random.default_rng(seed)
+    for kind in (*MISTAKES, "usual", "free"):
+        those = np.flatnonzero(kinds == kind)
+        if len(those) < (BAD if kind in MISTAKES else CLEAN // 2):
+            continue
+        for _ in range(pools):
+            if kind in MISTAKES:
+                good = rng.permutation(np.flatnonzero(kinds == "usual"))[:GOOD]
+                videos = [*good, *rng.permutation(those)[:BAD]]
+            else:
+                videos = [*rng.permutation(those)[:CLEAN]]
+            yield Drawn(
+                kind,
+                videos,
+                kinds[videos] == kind if kind in MISTAKES else np.zeros(len(videos), dtype=bool),
+            )
+
+
+def count(bank: Bank, drawn: Drawn, score: MomentScore) -> dict[str, float]:
+    """Return what is right about the judgement of one pool."""
+    bad, flagged = drawn.bad, score.flagged
+    right = [_place_is_right(bank, drawn, score, d) for d in np.flatnonzero(bad & flagged)]
+    return {
+        "auroc": auroc(score.losses, bad) if bad.any() else np.nan,
+        "found": flagged[bad].mean() if bad.any() else np.nan,
+        "accused": float(flagged[~bad].sum()),
+        "silent": float(not flagged[~bad].any()),
+        "place": float(np.mean(right)) if right else np.nan,
+    }
+
+
+def _mean(values: Sequence[float]) -> float:
+    """Return the mean of what is known, NaN where nothing is."""
+    known = [value for value in values if not np.isnan(value)]
+    return float(np.mean(known)) if known else np.nan
+
+
+def _place_is_right(bank: Bank, drawn: Drawn, score: MomentScore, d: int) -> bool:
+    """Tell whether the first finding of a demonstration lies at one of its mistakes."""
+    episode, first = bank.episodes[drawn.videos[d]], score.findings[d][0]
+    frames = sampled_frames(episode.length, len(bank.seen[first.camera][drawn.videos[d]]))
+    start, stop = frames[first.own.start], frames[first.own.stop - 1]
+    slack = NEAR * bank.pool.fps
+    return any(
+        start <= mistake.stop + slack and stop >= mistake.start - slack
+        for mistake in episode.record.mistakes
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

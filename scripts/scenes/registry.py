@@ -1,0 +1,11 @@
+"""The scenes. Half of them are kept back: no choice is made by what a filter does on them."""
+
+from scenes import bench, conveyor, hands, panel, pour, squares, stack, tabletop
+from scenes.scene import Scene
+
+TUNED_ON: tuple[Scene, ...] = (squares.SCENE, tabletop.SCENE, hands.SCENE, conveyor.SCENE)
+"""Scenes by which constants are chosen, together with tea-making."""
+HELD_BACK: tuple[Scene, ...] = (panel.SCENE, stack.SCENE, pour.SCENE, bench.SCENE)
+"""Scenes looked at only when everything is chosen."""
+SCENES = {scene.name: scene for scene in (*TUNED_ON, *HELD_BACK)}
+"""All scenes by name."""

@@ -1,0 +1,191 @@
+import numpy as np
+import pytest
+
+from filtering.judging.moments import Timeline, judge_moments
+from filtering.moments.agreement import agree
+from filtering.moments.counterparts import choose_references, compare, find_counterparts
+from filtering.moments.decision import KINDS, exceedances
+from filtering.moments.effects import states_of, usual_change
+from filtering.moments.evidence import peak, worst
+from filtering.moments.score import score_moments
+from filtering.moments.vectors import Video, moment_vectors
+from filtering.moments.windows import window_distances
+from teasim.common.errors import ConfigError
+from tests.filtering.moments.toy_videos import LENGTH, STEPS, toy_video, usual_videos
+
+MISSING = [0, 1, 3, 4]
+SWAPPED = [0, 3, 1, 2, 4]
+
+
+def judged(videos):
+    return score_moments({"front": videos})
+
+
+@pytest.fixture(scope="module")
+def with_a_step_missing():
+    return judged([*usual_videos(7), toy_video(MISSING, 50)])
+
+
+def test_window_distances_are_sums_along_diagonals():
+    rng = np.random.default_rng(0)
+    one, other = (rng.normal(size=(n, 3)).astype(np.float32) for n in (12, 15))
+    distances = window_distances(one, other, reach=2)
+    direct = np.sqrt(sum(np.square(one[5 + i] - other[7 + i]).sum() for i in range(-2, 3)))
+    assert distances.shape == (12, 15)
+    assert distances[5, 7] == pytest.approx(direct, rel=1e-4)
+    assert np.allclose(distances.T, window_distances(other, one, reach=2), atol=1e-3)
+
+
+def test_a_video_is_its_own_counterpart():
+    video = moment_vectors(usual_videos(3))
+    found = compare([video[0], video[0].copy()], (0, 1))
+    match = found.there[0][1]
+    assert match is not None
+    assert np.array_equal(match.at, np.arange(len(video[0])))
+
+
+def test_a_missing_step_is_found_at_its_place(with_a_step_missing):
+    score = with_a_step_missing
+    assert score.losses.argmax() == 7
+    assert score.flagged.tolist() == [False] * 7 + [True]
+    missing = next(one for one in score.findings[7] if one.kind == "missing")
+    # The step is the third of five: in the other video it lies there.
+    middle = (missing.other.start + missing.other.stop) / 2
+    assert abs(middle - 2.5 * LENGTH) < LENGTH
+    assert missing.other.video != 7
+
+
+def test_a_step_out_of_order_is_found():
+    score = judged([*usual_videos(7), toy_video(SWAPPED, 50)])
+    assert score.losses.argmax() == 7
+    assert score.flagged[7]
+    assert score.exceeded["order"].argmax() == 7
+
+
+def test_an_extra_step_is_found():
+    score = judged([*usual_videos(7), toy_video([0, 1, 5, 2, 3, 4], 50)])
+    assert score.losses.argmax() == 7
+    assert score.exceeded["extra"].argmax() == 7
+
+
+def test_a_step_without_effect_is_found_though_its_motion_is_as_usual():
+    works = [True, True, False, True, True]
+    score = judged([*usual_videos(7), toy_video(range(STEPS), 50, works=works)])
+    assert score.exceeded["ineffective"].argmax() == 7
+    assert score.losses.argmax() == 7
+
+
+def test_a_pool_without_mistakes_is_not_accused():
+    assert not judged(usual_videos(9)).flagged.any()
+
+
+def test_a_missing_step_stands_out_among_other_tempi():
+    tempi = (0.9, 1.0, 1.1) * 3
+    videos = [toy_video(range(STEPS), seed, tempo=tempo) for seed, tempo in enumerate(tempi)]
+    score = judged([*videos, toy_video(MISSING, 50)])
+    assert score.losses.argmax() == len(videos)
+    assert score.flagged[-1]
+
+
+def test_the_same_videos_give_the_same_bits(with_a_step_missing):
+    again = judged([*usual_videos(7), toy_video(MISSING, 50)])
+    assert np.array_equal(again.losses, with_a_step_missing.losses)
+
+
+def test_demonstrations_in_another_order_get_their_own_losses(with_a_step_missing):
+    videos = [toy_video(MISSING, 50), *usual_videos(7)]
+    assert np.allclose(
+        judged(videos).losses, np.roll(with_a_step_missing.losses, 1), rtol=1e-2, atol=1e-2
+    )
+
+
+def test_a_camera_that_sees_nothing_changes_nothing(with_a_step_missing):
+    videos = [*usual_videos(7), toy_video(MISSING, 50)]
+    blind = [Video(np.zeros_like(v.looks), np.full_like(v.cells, 90)) for v in videos]
+    both = score_moments({"front": videos, "blind": blind})
+    assert np.array_equal(both.losses, with_a_step_missing.losses)
+
+
+def test_a_verdict_says_where_it_is_seen():
+    videos = [*usual_videos(7), toy_video(MISSING, 50)]
+    timeline = Timeline([2 * len(v) for v in videos], [f"video {n}" for n in range(8)], 10.0)
+    found = judge_moments({"front": videos}, timeline)
+    assert found.verdict.grouping.flagged.tolist() == [False] * 7 + [True]
+    assert found.reasons[0] == ""
+    assert "video" in found.reasons[7]
+    assert found.verdict.weights[7] < 0.5 < found.verdict.weights[:7].min()
+
+
+def test_large_pools_are_compared_with_central_videos_alone():
+    rng = np.random.default_rng(0)
+    vectors = [rng.normal(size=(12, 2)).astype(np.float32) for _ in range(40)]
+    references = choose_references(vectors)
+    assert len(references) == 30 - 6  # the most central three fifths of 40
+    assert len(compare(vectors, references).there[0]) == 40
+
+
+def test_an_evidence_is_measured_against_its_pool():
+    values = np.array([0.1, 0.2, 0.15, 0.12, 0.9])
+    for kind in KINDS:
+        assert exceedances(kind, values).argmax() == 4
+    assert np.allclose(exceedances("missing", values), exceedances("missing", values + 3))
+
+
+def test_the_worst_twelfth_counts():
+    curve = np.zeros(48)
+    curve[20:24] = 1.0
+    assert worst(curve) == 1.0
+    start, stop = peak(curve)
+    assert start <= 20
+    assert stop >= 24
+
+
+def test_what_changes_nowhere_is_no_usual_change():
+    assert usual_change(0, np.zeros((5, 6, 8, 3))) is None
+
+
+def test_states_do_not_depend_on_the_light():
+    video = usual_videos(1)[0]
+    dark = Video(video.looks, (video.cells * 0.5).astype(np.uint8))
+    difference = np.abs(states_of(video).astype(float) - states_of(dark).astype(float))
+    assert difference.mean() < 3
+
+
+def test_borders_of_agreed_stretches_lie_where_orders_differ():
+    orders = [[0, 1, 2, 3, 4], [0, 2, 1, 3, 4], [0, 1, 2, 3, 4], [0, 2, 1, 3, 4]] * 2
+    videos = [toy_video(order, seed) for seed, order in enumerate(orders)]
+    agreed = agree(find_counterparts(moment_vectors(videos)))
+    assert agreed.borders
+    assert all(0 < share <= 1 for share in agreed.borders)
+    near = [min(abs(s.start - k * LENGTH) for s in agreed.stretches[1:]) for k in (1, 3)]
+    assert min(near) <= LENGTH // 2
+
+
+def test_fewer_than_three_videos_are_refused():
+    with pytest.raises(ConfigError, match=r"^2 videos were given; moments need 3 or more"):
+        judged(usual_videos(2))
+
+
+def test_a_video_too_short_is_refused():
+    short = Video(np.zeros((4, 3), np.float32), np.zeros((4, 6, 8, 3), np.uint8))
+    with pytest.raises(ConfigError, match=r"^Video 2 has 4 moments; moments need 10 or more"):
+        judged([*usual_videos(2), short])
+
+
+def test_cameras_that_see_nothing_are_refused():
+    blind = [Video(v.looks, np.full_like(v.cells, 90)) for v in usual_videos(3)]
+    with pytest.raises(ConfigError, match=r"^Nothing happens in the pictures of front;"):
+        judged(blind)
+
+
+def test_videos_of_different_tasks_are_refused():
+    rng = np.random.default_rng(0)
+    videos = [
+        Video(
+            np.cumsum(rng.normal(size=(80, 24)), axis=0).astype(np.float32),
+            rng.integers(0, 255, (80, 18, 24, 3)).astype(np.uint8),
+        )
+        for _ in range(5)
+    ]
+    with pytest.raises(ConfigError, match=r"^These videos do not show one task:"):
+        judged(videos)
