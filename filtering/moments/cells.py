@@ -62,7 +62,7 @@ def describe_cells(task: FrameTask) -> NDArray[np.float32]:
         scale = SHORT_SIDE / min(height, width)
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
         parts += [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in images]
-    return np.stack(parts).astype(np.uint8)  # type: ignore[return-value]
+    return np.stack(parts).astype(np.uint8)
 
 
 def _key(task: FrameTask) -> str:

@@ -100,9 +100,9 @@ def test_a_threshold_can_be_a_number(
 @pytest.mark.parametrize(
     ("options", "seen"),
     [
-        (["--no-effects"], []),
-        ([], ["left", "cup"]),
-        (["--camera", "left"], ["left"]),
+        (["--segmenter", "logged", "--no-effects"], []),
+        (["--segmenter", "logged"], ["left", "cup"]),
+        (["--segmenter", "logged", "--camera", "left"], ["left"]),
         (["--no-effects", "--segmenter", "clustering"], ["left"]),
     ],
 )
@@ -110,7 +110,8 @@ def test_the_cameras_that_were_looked_at_are_told(
     toy_pool: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str], options, seen
 ) -> None:
     out = tmp_path / "out"
-    assert main([str(toy_pool.root), "-o", str(out), "--jobs", "1", *options]) == 0
+    argv = [str(toy_pool.root), "-o", str(out), "--jobs", "1", "--score", "norm"]
+    assert main([*argv, *options]) == 0
     told = ", ".join(seen) or "none"
     assert f"cameras looked at: {told}\n" in capsys.readouterr().out
     assert json.loads((out / "filter.json").read_text())["cameras_looked_at"] == seen
