@@ -94,19 +94,12 @@ def write_filter_output(
     """
     folder = Path(out)
     check_output(folder, pool.root, overwrite=overwrite)
-    rows = fitted.table()
-    keep = [row.episode_index for row in rows if not row.flagged]
-    exclude = [row.episode_index for row in rows if row.flagged]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_weight_table(folder / "weights.csv", rows)
-        write_json(folder / "filter.json", run_record(fitted, pool))
-        write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
-        write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))
+        _write_results(folder, pool, fitted)
     except OSError as error:
         raise TeasimError(f"The output '{out}' cannot be written: {error.strerror}.") from error
     (folder / "report.html").unlink(missing_ok=True)  # never a page of other weights
-    remove_videos(folder)
     try:
         render_report(
             folder / "report.html",
@@ -120,6 +113,18 @@ def write_filter_output(
         remove_videos(folder)
         reason = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         print(f"teasim: warning: the page could not be made: {reason}.", file=sys.stderr)
+
+
+def _write_results(folder: Path, pool: Source, fitted: DemoFilter) -> None:
+    """Write what other tools read, and remove the videos of an earlier page."""
+    rows = fitted.table()
+    keep = [row.episode_index for row in rows if not row.flagged]
+    exclude = [row.episode_index for row in rows if row.flagged]
+    write_weight_table(folder / "weights.csv", rows)
+    write_json(folder / "filter.json", run_record(fitted, pool))
+    write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
+    write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))
+    remove_videos(folder)
 
 
 def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:

@@ -104,7 +104,7 @@ def test_more_incorrect_demonstrations_than_correct_ones_are_refused(tmp_path):
 def test_a_failed_generation_says_its_own_sentence(tmp_path):
     (tmp_path / "pool").write_text("in the way")
     with pytest.raises(PoolError) as error:
-        demo.generate_pool(tmp_path / "pool", settings(tmp_path), 1)
+        demo.generate_pool(tmp_path / "pool", settings(tmp_path))
     assert str(error.value) == (
         f"'{tmp_path / 'pool'}' is a file; choose a folder that is new or empty."
     )
