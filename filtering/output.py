@@ -20,10 +20,11 @@ from filtering.segmentation.scoring import score_episodes, scores_json
 from teasim.common.errors import ConfigError, TeasimError
 from teasim.common.files import write_json, write_text
 from teasim.common.workers import IN_PROCESS, Workers
+from teasim.pool.segments_table import segment_rows, write_segments_table
 from teasim.pool.source import Source
 from teasim.pool.weight_table import write_weight_table
 
-FILES = ("weights.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
+FILES = ("weights.csv", "segments.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
 """Files of an output folder; beside them stands the folder of the page's videos, if any."""
 PACKAGES = ("teasim", "numpy", "scipy", "scikit-learn", "torch", "opencv-python-headless")
 """Packages whose versions are recorded, because weights may depend on them."""
@@ -121,6 +122,7 @@ def _write_results(folder: Path, pool: Source, fitted: DemoFilter) -> None:
     keep = [row.episode_index for row in rows if not row.flagged]
     exclude = [row.episode_index for row in rows if row.flagged]
     write_weight_table(folder / "weights.csv", rows)
+    write_segments_table(folder / "segments.csv", segment_rows(pool, fitted.segments_.spans))
     write_json(folder / "filter.json", run_record(fitted, pool))
     write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
     write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))

@@ -1,6 +1,6 @@
-"""Make length-matched pools with every kind of mistake and tell what gives the mistakes away.
+"""Measure how well single clues reveal mistakes in length-matched pools with all of them.
 
-Exit code 1 when a clue's AUROC, averaged over the pools, is further than 0.1 from 0.5.
+The exit code is 1 if the mean AUROC of a clue over the pools differs from 0.5 by more than 0.1.
 """
 
 import argparse
@@ -22,13 +22,17 @@ TOLERANCE = 0.1
 def main() -> int:
     """Run the check."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="where the pools are kept between runs")
-    parser.add_argument("--pools", type=int, default=20, help="number of pools; seeds 0, 1, ...")
+    parser.add_argument("folder", type=Path, help="folder of the pools, which are reused")
+    parser.add_argument(
+        "--pools", type=int, default=20, help="number of pools, with seeds 0, 1, ..."
+    )
     parser.add_argument("--correct", type=int, default=10, help="correct demonstrations in each")
-    parser.add_argument("--each", type=int, default=1, help="of every kind of mistake in each")
+    parser.add_argument(
+        "--each", type=int, default=1, help="demonstrations of each mistake in each"
+    )
     parser.add_argument("--size", type=int, default=224, help="side of the videos [pixels]")
     parser.add_argument("--cameras", nargs="+", default=["left"], help="cameras that film")
-    parser.add_argument("--jobs", type=int, default=default_jobs(), help="processes")
+    parser.add_argument("--jobs", type=int, default=default_jobs(), help="number of processes")
     arguments = parser.parse_args()
     found = [leakage(_pool(arguments, seed)) for seed in range(arguments.pools)]
     table = {clue: np.array([values[clue] for values in found]) for clue in CLUES}

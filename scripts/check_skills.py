@@ -1,7 +1,7 @@
-"""Carry out many random demonstrations without pictures and report what a real robot would mind.
+"""Execute many random demonstrations without pictures and check them against the robot's limits.
 
-Exit code 1 when a demonstration does not come out as planned, spills, bumps into something, or
-moves faster than a YuMi can.
+The exit code is 1 if a demonstration does not follow its plan, spills, collides, or exceeds a speed
+limit of YuMi.
 """
 
 import argparse
@@ -33,30 +33,30 @@ from teasim.world.simulation import Simulation
 
 @dataclass(frozen=True)
 class Report:
-    """What one demonstration came to."""
+    """Measurements of one demonstration."""
 
     seed: int
     """Seed of its layout, style and mistakes."""
     as_planned: bool
-    """The planned sub-tasks happened, in order, and the goal was reached if it was to be."""
+    """Whether exactly the planned sub-tasks were recognised, in order."""
     what: str
-    """Why not, or nothing."""
+    """Steps, and the difference from the plan."""
     spilled: float
-    """Amount on the table [ml or g]."""
+    """Spilled amount [ml or g]."""
     joint_speed: float
     """Largest joint speed as a share of its limit."""
     tcp_speed: float
     """Largest speed of a tool centre point [m/s]."""
     penetration: float
-    """Deepest penetration of a contact [m]."""
+    """Largest depth of a contact [m]."""
     forbidden: tuple[Pair, ...]
-    """What touched and must not."""
+    """Pairs of roles that touched and must not."""
     seconds: float
     """Length of the demonstration [s]."""
 
     @property
     def complaints(self) -> list[str]:
-        """Everything that is not as it should be."""
+        """One phrase per limit that is exceeded."""
         found = [] if self.as_planned else [self.what]
         found += [f"{first} touches {second}" for first, second in self.forbidden]
         if self.joint_speed > 1:
@@ -69,7 +69,7 @@ class Report:
 
 
 def plan(arguments: argparse.Namespace, rng: np.random.Generator) -> Plan:
-    """What the demonstration of one seed is to be."""
+    """Draw the plan of one demonstration."""
     if arguments.mistake:
         return spoil(Plan(SEQ_1), arguments.mistake, rng)
     if arguments.sequence == INCORRECT:
@@ -79,7 +79,7 @@ def plan(arguments: argparse.Namespace, rng: np.random.Generator) -> Plan:
 
 
 def check(arguments: argparse.Namespace, seed: int) -> Report:
-    """Carry out one random demonstration."""
+    """Execute and measure one random demonstration."""
     rng = np.random.default_rng([2, seed])
     demo = DemoPlan(seed, arguments.sequence, plan(arguments, rng))
     simulation = Simulation()
@@ -104,16 +104,18 @@ def check(arguments: argparse.Namespace, seed: int) -> Report:
 
 
 def main() -> int:
-    """Check the demonstrations asked for."""
+    """Run the check."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=50, help="number of demonstrations")
     parser.add_argument("--first-seed", type=int, default=0, help="seed of the first one")
-    parser.add_argument("--jobs", type=int, default=default_jobs(), help="processes to work in")
-    parser.add_argument("--sequence", choices=SEQUENCES, default=OPTIMAL, help="what to make")
+    parser.add_argument("--jobs", type=int, default=default_jobs(), help="number of processes")
+    parser.add_argument(
+        "--sequence", choices=SEQUENCES, default=OPTIMAL, help="order of the sub-tasks"
+    )
     parser.add_argument(
         "--mistake", default="", help="a mistake in Seq_1: NAME[@SUBTASK][+NAME...]"
     )
-    parser.add_argument("--match-length", action="store_true", help="draw them out to one length")
+    parser.add_argument("--match-length", action="store_true", help="add rests that match lengths")
     given = parser.parse_args()
     if given.seeds < 1 or given.jobs < 1:
         parser.error("--seeds and --jobs have to be 1 or more")

@@ -1,4 +1,4 @@
-"""Draw the picture of the station in README.md: YuMi pouring the water, in `nice` quality."""
+"""Render the picture of README.md: YuMi pours the water, in `nice` quality."""
 
 import argparse
 from pathlib import Path
@@ -19,7 +19,7 @@ WIDTH, HEIGHT = 1200, 720
 
 
 def pouring() -> Simulation:
-    """Return the station in the middle of pouring water."""
+    """Return the station while water is poured."""
     simulation = Simulation()
     simulation.reset(nominal_layout())
     for subtask in ("turn_on_oven", "add_tea_bag"):
@@ -32,7 +32,7 @@ def pouring() -> Simulation:
 
 
 def draw(path: Path) -> None:
-    """Write the picture to `path`."""
+    """Render the picture and write it to `path`."""
     simulation = pouring()
     camera = mujoco.MjvCamera()
     camera.lookat[:] = (0.24, 0.0, 0.16)

@@ -1,8 +1,8 @@
-"""Draw the low-poly shapes of the robot and the props and write them as OBJ files.
+"""Compute the low-poly meshes of the robot and the props and write them as OBJ files.
 
-Every shape here is our own: tubes swept between the joint origins of the arm, chamfered boxes for
-the body, and lathe profiles for the vessels. Run it after changing a shape; a test holds the files
-in `assets/` to what this program draws.
+All shapes are designed here: tubes swept between the joint origins of the arm, chamfered boxes for
+the body, and lathe profiles for the vessels. Run it after a change of a shape; a test compares the
+files in `assets/` with its output.
 """
 
 import argparse
@@ -17,14 +17,14 @@ Mesh = tuple[np.ndarray, np.ndarray]  # vertices (n, 3) in m, triangles (m, 3)
 
 
 def lathe(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
-    """Revolve a (radius, height) profile about z; outward when it runs counter-clockwise."""
+    """Revolve a profile of (radius, height) [m] about z; faces point outward if it runs upward."""
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     rings = [np.c_[r * np.cos(angles), r * np.sin(angles), np.full(sides, z)] for r, z in profile]
     return np.concatenate(rings), _quads(len(rings), sides)
 
 
 def tube(points: Sequence[Sequence[float]], radii: Sequence[float], sides: int = 14) -> Mesh:
-    """Sweep a circle along a polyline, with rounded ends."""
+    """Sweep a circle along a polyline (n, 3) [m] with radii (n,) [m]; the ends are rounded."""
     path, radius = np.asarray(points, float), np.asarray(radii, float)
     first, last = _unit(path[0] - path[1]), _unit(path[-1] - path[-2])
     caps = [(0.97, 0.30), (0.75, 0.66), (0.38, 0.92), (0.02, 1.0)]  # a quarter circle (r, height)
@@ -45,7 +45,7 @@ def tube(points: Sequence[Sequence[float]], radii: Sequence[float], sides: int =
 
 
 def chamfered_box(centre: Sequence[float], half: Sequence[float], chamfer: float) -> Mesh:
-    """Box whose edges are cut off by `chamfer` metres."""
+    """Return a box with centre and half sizes (3,) [m] and edges cut off by `chamfer` [m]."""
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     corners = []
     for axis in range(3):
@@ -56,7 +56,7 @@ def chamfered_box(centre: Sequence[float], half: Sequence[float], chamfer: float
 
 
 def hull(points: np.ndarray) -> Mesh:
-    """Convex hull with outward triangles."""
+    """Return the convex hull of points (n, 3) [m] with triangles that face outward."""
     result = ConvexHull(points)
     keep = np.unique(result.simplices)
     index = np.full(len(points), -1)
@@ -69,7 +69,7 @@ def hull(points: np.ndarray) -> Mesh:
 
 
 def join(*meshes: Mesh) -> Mesh:
-    """Put several meshes into one."""
+    """Concatenate meshes."""
     offset, vertices, triangles = 0, [], []
     for v, t in meshes:
         vertices.append(v)
@@ -79,12 +79,12 @@ def join(*meshes: Mesh) -> Mesh:
 
 
 def moved(mesh: Mesh, offset: Sequence[float]) -> Mesh:
-    """Translate a mesh."""
+    """Translate a mesh by `offset` (3,) [m]."""
     return mesh[0] + np.asarray(offset, float), mesh[1]
 
 
 def axle(half_length: float, radius: float, sides: int = 16) -> Mesh:
-    """Joint housing: a short cylinder along z with a softened edge."""
+    """Return a joint housing: a cylinder along z with rounded edges; lengths in m."""
     edge = 0.15 * radius
     profile = [
         (0.001, -half_length),
@@ -116,7 +116,7 @@ def _any_normal(direction: np.ndarray) -> np.ndarray:
 
 
 def vessel(outer: float, inner: float, height: float, base: float) -> Mesh:
-    """Open vessel: outside up, over the rim, inside down to the base."""
+    """Return an open vessel with outer and inner radius, height and thickness of the base [m]."""
     rim = outer - 0.0008
     return lathe(
         [
@@ -134,12 +134,12 @@ def vessel(outer: float, inner: float, height: float, base: float) -> Mesh:
 
 
 def spout(start: Sequence[float], tip: Sequence[float], wide: float, narrow: float) -> Mesh:
-    """Tapering spout from the wall of a vessel to its tip."""
+    """Return a spout that tapers from radius `wide` at `start` to `narrow` at `tip` [m]."""
     return tube([start, tip], [wide, narrow], sides=8)
 
 
 def handle(bar_x: float, body: float, low: float, high: float) -> Mesh:
-    """C-shaped handle: a bar parallel to the vessel's axis and two cross-bars."""
+    """Return a handle: a bar parallel to the vessel's axis and two cross-bars; lengths in m."""
     bar = chamfered_box((bar_x, 0, (low + high) / 2), (0.006, 0.008, (high - low) / 2), 0.002)
     reach = (body - abs(bar_x)) / 2
     centre = bar_x - reach
@@ -222,7 +222,7 @@ PROPS = {
 
 
 def write_obj(path: Path, mesh: Mesh) -> None:
-    """Write a mesh with 0.01 mm resolution, so the file is the same on every machine."""
+    """Write a mesh with a resolution of 0.01 mm, which is the same on every machine."""
     vertices, triangles = mesh
     lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in vertices + 0.0]
     lines += [f"f {a} {b} {c}" for a, b, c in triangles + 1]

@@ -1,11 +1,11 @@
-"""Headless OpenGL: the back end that MuJoCo renders with, chosen when it is first needed.
+"""Headless OpenGL: selection of the back end with which MuJoCo renders.
 
-EGL comes first (it finds a graphics card and falls back to the processor by itself), OSMesa second
-(the processor only). Both give identical frames on a machine without a graphics card.
+EGL is tried first (it uses a graphics card if there is one), then OSMesa (processor only). Both
+render identical frames on a machine without a graphics card.
 
-MuJoCo takes the back end from the environment variable MUJOCO_GL at the time it is imported, and
-has no other interface for it. `choose_gl` therefore writes this variable, and no other one, in this
-process and for its children. It never replaces a value that the user has set.
+MuJoCo reads the back end from the environment variable MUJOCO_GL when it is imported and has no
+other interface for it. `choose_gl` therefore sets this variable, and no other, for this process and
+its children. It never replaces a value that the user has set.
 """
 
 import ctypes
@@ -21,19 +21,23 @@ from typing import Any
 from teasim.common.errors import RenderError
 
 BACKENDS = ("egl", "osmesa")
+"""Headless back ends in the order in which they are tried."""
 USER_CHOICES = (*BACKENDS, "glfw", "glx")
+"""Admissible values of MUJOCO_GL."""
 
 LIBRARIES = {"egl": ("libEGL.so.1", "libOpenGL.so.0"), "osmesa": ("libOSMesa.so.8",)}
+"""Shared libraries that each back end needs."""
 FIXES = {
     "egl": "apt-get install libegl1 libgl1-mesa-dri libopengl0",
     "osmesa": "apt-get install libosmesa6",
 }
+"""Command that installs each back end on Debian and Ubuntu."""
 
 # Constants of the EGL registry (EGL_EXT_platform_device).
 _EGL_PLATFORM_DEVICE_EXT = 0x313F
 _MAX_DEVICES = 32
 
-_PROBE_SECONDS = 120.0  # a software renderer's first start on a busy machine is slow
+_PROBE_SECONDS = 120.0  # the first start of a software renderer is slow on a busy machine
 _PROBE_SCENE = """
 <mujoco>
   <visual><quality shadowsize="0" offsamples="0"/></visual>
@@ -65,16 +69,16 @@ print(1000 * seconds / 20)
 
 
 def choose_gl() -> str:
-    """Make MuJoCo render without a display and return the back end's name; cheap to call again.
+    """Select a back end that renders without a display and return its name; cheap to repeat.
 
-    Where the user has not set the environment variable MUJOCO_GL, it is set to the result. Call
-    this before the first `mujoco.Renderer`; it may come after `import mujoco`.
+    MUJOCO_GL is set to the result unless the user has set it. Call this before the first
+    `mujoco.Renderer` is made; mujoco may be imported before.
 
     Raises:
-        RenderError: MUJOCO_GL is set to something that cannot work, or no back end's library loads.
+        RenderError: MUJOCO_GL has an inadmissible value, or no back end works.
     """
     wish = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if platform.system() != "Linux":  # on other systems MuJoCo's default renders off screen
+    if platform.system() != "Linux":  # elsewhere, MuJoCo's default renders off screen
         return wish or "default"
     if wish and wish not in USER_CHOICES:
         raise RenderError(
@@ -98,7 +102,7 @@ def choose_gl() -> str:
 
 
 def find_problem(backend: str) -> str | None:
-    """Return why `backend` (one of `BACKENDS`) cannot work, or None; MuJoCo is not imported."""
+    """Return why `backend`, one of `BACKENDS`, cannot work, or None; MuJoCo is not imported."""
     for name in LIBRARIES[backend]:
         if _load(name) is None:
             return f"{name} is missing"
@@ -110,7 +114,7 @@ def find_problem(backend: str) -> str | None:
 def _set_backend(backend: str) -> None:
     """Set MUJOCO_GL, the only variable this module writes, and make MuJoCo read it."""
     os.environ["MUJOCO_GL"] = backend
-    # MuJoCo reads the variable when it is imported; if that has happened, it has to be repeated.
+    # MuJoCo reads the variable on import, so a module that is imported already is reloaded.
     for name in ("mujoco.rendering.classic.gl_context", "mujoco.gl_context"):
         if name in sys.modules:
             importlib.reload(sys.modules[name])
@@ -132,7 +136,7 @@ def _egl_device_starts() -> bool:
     def function(name: bytes, result: Any, *arguments: Any) -> Callable[..., Any]:
         address = egl.eglGetProcAddress(name)
         if not address:
-            return lambda *_: None  # an EGL without this extension: no device will be found
+            return lambda *_: None  # without this extension no device is found
         prototype = ctypes.CFUNCTYPE(result, *arguments)
         return prototype(address)
 
@@ -147,7 +151,7 @@ def _egl_device_starts() -> bool:
 
 @dataclass(frozen=True)
 class Probe:
-    """Result of rendering a small scene with one back end in a process of its own."""
+    """Result of rendering a small scene with one back end in a child process."""
 
     backend: str
     """Name as in MUJOCO_GL."""
@@ -156,11 +160,11 @@ class Probe:
     ms_per_frame: float | None
     """Duration of a 224x224 frame [ms], or None if nothing was rendered."""
     problem: str | None
-    """What went wrong, or None."""
+    """Why nothing was rendered, or None."""
 
 
 def probe(backend: str) -> Probe:
-    """Render a small scene with `backend` in a child process, independent of this one's choice."""
+    """Render a small scene with `backend` in a child process; this process is not affected."""
     environment = {k: v for k, v in os.environ.items() if k != "PYOPENGL_PLATFORM"}
     environment["MUJOCO_GL"] = backend
     try:
@@ -175,14 +179,14 @@ def probe(backend: str) -> Probe:
         return Probe(backend, False, None, f"no picture within {_PROBE_SECONDS:.0f} s")
     if child.returncode == 0:
         return Probe(backend, True, round(float(child.stdout), 2), None)
-    # The libraries' own message for a missing library is obscure; the plain reason is better.
+    # The message of a missing library is obscure; `find_problem` gives a plain reason.
     last = (child.stderr.strip().splitlines() or [f"exit code {child.returncode}"])[-1]
     reason = find_problem(backend) if backend in BACKENDS else None
     return Probe(backend, False, None, reason or last)
 
 
 def first_working() -> Probe:
-    """Probe the user's choice (MUJOCO_GL), or else each back end until one works.
+    """Probe the value of MUJOCO_GL, or without one each back end until one works.
 
     Raises:
         RenderError: none of them renders.

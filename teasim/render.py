@@ -1,4 +1,4 @@
-"""Pictures of the station, rendered off screen; the first picture starts OpenGL."""
+"""Off-screen renderer of the station: pictures, segmentation masks and depth maps."""
 
 import os
 from collections.abc import Sequence
@@ -10,10 +10,10 @@ import numpy as np
 
 from teasim.common.errors import RenderError
 from teasim.gl import choose_gl
-from teasim.world.borrowing import Borrowed
-from teasim.world.dressing import apply_look
 from teasim.world.liquids import VESSELS, Stream
-from teasim.world.looks import Look
+from teasim.world.looks.borrowing import Borrowed
+from teasim.world.looks.dressing import apply_look
+from teasim.world.looks.look import Look
 from teasim.world.pictures import check_picture
 from teasim.world.segments import SEGMENT_NAMES, segments
 from teasim.world.simulation import Simulation
@@ -23,9 +23,9 @@ STREAM_RADIUS = 0.003
 SHADOW_MAP = 2048
 """Side of the shadow map in `nice` quality [pixels]; 4096 takes three times as long."""
 SHADOWED = 1.45
-"""Range of the shadows around the point the lamp is aimed at, in extents of the model."""
+"""Radius of the shadowed region around the point the lamp aims at, in extents of the model."""
 SMOOTHING = 2
-"""Pictures of `nice` quality are rendered at this multiple of the size and averaged."""
+"""Factor by which `nice` pictures are rendered larger, then averaged."""
 FAR = 30.0
 """Distance of the far clipping plane in `nice` quality, in extents of the model."""
 _TEXTURED = {"ground": "ground", "table": "table_grain"}
@@ -39,9 +39,9 @@ _processes: set[int] = set()  # that started OpenGL: this one, or one it was for
 class StationRenderer:
     """Renders one simulation from named cameras.
 
-    `fast` has no shadows and no smoothing; `nice` has both. Use it as a context manager: an
-    OpenGL context has to be closed before Python ends. While it is open, it changes the appearance
-    of the simulation's model, and nothing that physics depends on; `close` restores all of it.
+    Quality `fast` has no shadows and no smoothing; `nice` has both. Use it as a context manager: an
+    OpenGL context has to be closed before Python exits. While it is open, it changes the appearance
+    of the simulation's model but nothing that physics depends on; `close` restores the appearance.
     """
 
     def __init__(
@@ -53,11 +53,19 @@ class StationRenderer:
         quality: str = "fast",
         look: Look | None = None,
     ) -> None:
-        """Start OpenGL, and apply `look` if there is one.
+        """Start OpenGL and apply a look.
+
+        Args:
+            simulation: The station to render.
+            width: Width of the pictures [pixels].
+            height: Height of the pictures [pixels].
+            quality: `fast` or `nice`.
+            look: Look to apply; None keeps the present one.
 
         Raises:
             ConfigError: unknown quality, or a side out of range.
-            RenderError: no headless back end works, or none can after a fork.
+            RenderError: no headless back end works, or this process was forked from one that has
+                rendered.
         """
         check_picture(width, height, quality)
         check_not_forked()
@@ -105,17 +113,17 @@ class StationRenderer:
         apply_look(self._model, look, self._simulation.data)
 
     def frames(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
-        """Return one (height, width, 3) uint8 RGB picture per camera of the present state."""
+        """Return a picture (height, width, 3) uint8 RGB of the present state by camera."""
         self._simulation.paint()
         return {camera: self._frame(camera) for camera in cameras}
 
     def picture(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
-        """Return one (height, width, 3) uint8 RGB picture from a named or a free camera."""
+        """Return a picture (height, width, 3) uint8 RGB from a named or a free camera."""
         self._simulation.paint()
         return self._frame(camera)
 
     def masks(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
-        """Return what every pixel shows, per camera: (height, width) int32 of `SEGMENT_NAMES`."""
+        """Return a mask (height, width) int32 by camera: indices into `SEGMENT_NAMES`."""
         self._simulation.paint()
         meter = self._measuring()
         meter.enable_segmentation_rendering()
@@ -125,9 +133,9 @@ class StationRenderer:
             meter.disable_segmentation_rendering()
 
     def depths(self, cameras: Sequence[str]) -> dict[str, np.ndarray]:
-        """Return the distance along the camera's axis, per camera: (height, width) float32 [m].
+        """Return a depth map (height, width) float32 [m] by camera.
 
-        Pixels of the sky have the distance of the far clipping plane.
+        Depth is the distance along the camera's axis; that of the sky is the far clipping plane.
         """
         self._simulation.paint()
         meter = self._measuring()
@@ -160,7 +168,7 @@ class StationRenderer:
         return np.asarray(renderer.render())
 
     def _measuring(self) -> mujoco.Renderer:
-        """Return a renderer without smoothing, which would mix the numbers at an edge."""
+        """Return a renderer without smoothing, which would average segment numbers at edges."""
         if self._quality == "fast":
             return self._renderer
         if self._meter is None:
@@ -169,7 +177,7 @@ class StationRenderer:
 
     def _start(self, scale: int) -> mujoco.Renderer:
         height, width = (scale * side for side in self._size)
-        buffer = self._model.vis.global_  # no larger than needed: it is cleared for every picture
+        buffer = self._model.vis.global_  # as small as possible: it is cleared for each picture
         buffer.offwidth, buffer.offheight = width, height
         try:
             most = self._model.ngeom + len(VESSELS)  # every vessel may pour
@@ -197,10 +205,10 @@ class StationRenderer:
 
 
 def check_not_forked() -> None:
-    """Refuse to render after a fork: OpenGL's threads do not survive it and rendering would hang.
+    """Refuse to render after a fork, in which OpenGL's threads are lost and rendering hangs.
 
     Raises:
-        RenderError: a process that this one was forked from has rendered.
+        RenderError: this process was forked from one that has rendered.
     """
     if _processes and os.getpid() not in _processes:
         raise RenderError(

@@ -2,16 +2,18 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 
 from teasim.common.errors import ConfigError, SkillError
-from teasim.constants import CONTROL_TIMESTEP
+from teasim.constants import ARMS, CONTROL_TIMESTEP
 from teasim.skills.demonstrators import OPERATOR, Participant, sample_style, varied
 from teasim.skills.library import perform
 from teasim.skills.pace import Pace, idle
 from teasim.skills.style import Style
 from teasim.task.mistakes import Plan
+from teasim.world.disturbance import disturbances
 from teasim.world.simulation import Simulation
 from teasim.world.station import draw_layout
 
@@ -40,13 +42,22 @@ def demonstrate(
     randomize: bool = True,
     match_length: bool = False,
     participant: Participant = OPERATOR,
+    execution_noise: float = 0.0,
 ) -> Iterator[Step]:
     """Reset the station to a random layout and let `participant` carry out `plan` step by step.
 
-    Without `randomize` everything starts in its nominal place. With `match_length` rests give the
-    demonstration a length independent of its plan. Each step is yielded before the simulation is
-    advanced, which happens when the next step is requested. The targets have the float32 precision
-    of a log, so `replay` gives the same bits.
+    Each step is yielded before the simulation is advanced, which happens when the next step is
+    requested. The targets have the float32 precision of a log, so `replay` gives the same bits.
+
+    Args:
+        simulation: The station.
+        plan: Sub-tasks and mistakes.
+        rng: The only source of randomness.
+        randomize: Draw the layout; otherwise everything starts in its nominal place.
+        match_length: Add rests that make the length independent of the plan.
+        participant: Who demonstrates.
+        execution_noise: Standard deviation of the disturbance of the executed targets [rad]; the
+            steps hold the planned targets.
 
     Raises:
         ConfigError: the simulation has another embodiment than the participant.
@@ -54,22 +65,57 @@ def demonstrate(
     """
     _take_place(simulation, participant)
     simulation.reset(draw_layout(rng, randomize=randomize))
+    offsets = _offsets(execution_noise, simulation, rng)
     style = sample_style(rng, participant)
     pace = Pace(plan.steps, participant.embodiment, rng) if match_length else None
+    steps = _steps(simulation, plan, rng, participant=participant, style=style, pace=pace)
+    for step, offset in zip(steps, offsets, strict=False):
+        yield step
+        simulation.step(step.target, offset)
+
+
+def _steps(
+    simulation: Simulation,
+    plan: Plan,
+    rng: np.random.Generator,
+    *,
+    participant: Participant,
+    style: Style,
+    pace: Pace | None,
+) -> Iterator[Step]:
+    """Yield the steps of a demonstration; the caller advances the simulation after each."""
     for position, subtask in enumerate(plan.steps):
         elapsed = float(simulation.data.time)
         rest = pace.rest(position, elapsed, style) if pace else 0.0
-        yield from _rest(simulation, subtask, position, rest, rng)
+        for target in idle(simulation, rest, rng):
+            yield _step(subtask, position, target)
         now = varied(style, rng, participant)
         for target in perform(subtask, simulation, now, plan.manner(position)):
-            yield from _advance(simulation, subtask, position, target)
+            yield _step(subtask, position, target)
     rest = pace.length - float(simulation.data.time) if pace else FINAL_REST
     if rest < FINAL_REST - CONTROL_TIMESTEP:
         raise SkillError(f"The demonstration exceeds its length by {FINAL_REST - rest:.1f} s.")
     last = len(plan.steps) - 1
-    yield from _rest(simulation, plan.steps[last], last, rest - FINAL_REST, rng)
+    for target in idle(simulation, rest - FINAL_REST, rng):
+        yield _step(plan.steps[last], last, target)
     for _ in range(round(FINAL_REST / CONTROL_TIMESTEP)):
-        yield from _advance(simulation, plan.steps[last], last, simulation.target)
+        yield _step(plan.steps[last], last, simulation.target)
+
+
+def _step(subtask: str, position: int, target: np.ndarray) -> Step:
+    return Step(subtask, position, target.astype(np.float32))
+
+
+def _offsets(
+    sigma: float, simulation: Simulation, rng: np.random.Generator
+) -> Iterator[np.ndarray | None]:
+    """Return an endless iterator of offsets of the executed targets; without noise, of None.
+
+    The noise has a generator of its own, so the layout and the style do not depend on it.
+    """
+    if not sigma:
+        return repeat(None)
+    return disturbances(sigma, len(ARMS) * simulation.embodiment.width, rng.spawn(1)[0])
 
 
 def _take_place(simulation: Simulation, participant: Participant) -> None:
@@ -82,33 +128,15 @@ def _take_place(simulation: Simulation, participant: Participant) -> None:
         simulation.dress(participant.appearance)
 
 
-def _rest(
-    simulation: Simulation,
-    subtask: str,
-    position: int,
-    seconds: float,
-    rng: np.random.Generator,
-) -> Iterator[Step]:
-    for target in idle(simulation, seconds, rng):
-        yield from _advance(simulation, subtask, position, target)
-
-
-def _advance(
-    simulation: Simulation, subtask: str, position: int, target: np.ndarray
-) -> Iterator[Step]:
-    logged = target.astype(np.float32)
-    yield Step(subtask, position, logged)
-    simulation.step(logged)
-
-
 def replay(
     simulation: Simulation,
     targets: Iterable[np.ndarray],
     rng: np.random.Generator,
     *,
     randomize: bool = True,
+    execution_noise: float = 0.0,
 ) -> Iterator[np.ndarray]:
-    """Carry out a demonstration again from its log.
+    """Carry out a demonstration again from its log, to the bit.
 
     Each target is yielded before the simulation is advanced, as in `demonstrate`.
 
@@ -117,11 +145,12 @@ def replay(
         targets: The log, column `action` of a pool: angles [rad] and openings [m] (16,) each.
         rng: The generator of the demonstration, `teasim.generation.demo_rng` for a pool.
         randomize: As in `demonstrate`.
+        execution_noise: As in `demonstrate`; the disturbance is the same for the same `rng`.
     """
     simulation.reset(draw_layout(rng, randomize=randomize))
-    for target in targets:
+    for target, offset in zip(targets, _offsets(execution_noise, simulation, rng), strict=False):
         yield target
-        simulation.step(target)
+        simulation.step(target, offset)
 
 
 def run_subtask(simulation: Simulation, subtask: str, style: Style) -> int:

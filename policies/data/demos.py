@@ -21,8 +21,8 @@ from teasim.pool import Episode, Pool
 from teasim.pool.lerobot.layout import ENVIRONMENT_STATE, STATE
 
 OBSERVE = ("auto", "pixels", "pixels_agent_pos", "state")
-"""`auto`: frames, and joint positions if the pool logs them (videos of people have none). `state`:
-joint positions and environment state, no frames; needs no rendering."""
+"""`auto`: frames, and joint positions if the pool logs them (videos of people have none); without
+cameras, `state`. `state`: joint positions and environment state, no frames; needs no rendering."""
 
 
 @dataclass(frozen=True)
@@ -78,15 +78,16 @@ def observation_spec(pool: Pool, config: DemosConfig) -> ObservationSpec:
     """
     unknown = [camera for camera in config.cameras if camera not in pool.cameras]
     if unknown:
-        raise ConfigError(
-            f"'{pool.root}' has no camera '{unknown[0]}'; choose {', '.join(pool.cameras)}."
-        )
+        choices = ", ".join(pool.cameras) or "none"
+        raise ConfigError(f"'{pool.root}' has no camera '{unknown[0]}'; choose {choices}.")
     if config.observe in ("pixels_agent_pos", "state") and not pool.state_names:
         raise ConfigError(
             f"'{pool.root}' logs no joint positions; choose observe auto or pixels instead."
         )
-    if config.observe == "state":
+    if config.observe == "state" or (config.observe == "auto" and not pool.cameras):
         return ObservationSpec((), 0, 0, tuple(pool.state_names or ()), _environment_names(pool))
+    if not pool.cameras:
+        raise ConfigError(f"'{pool.root}' has no camera; choose observe auto or state instead.")
     names = () if config.observe == "pixels" else pool.state_names or ()
     cameras = config.cameras or pool.cameras
     height, width, _ = pool.episodes[0].clip(cameras[0]).frames([0])[0].shape

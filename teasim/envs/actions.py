@@ -10,7 +10,7 @@ import numpy as np
 from teasim.common.errors import ConfigError
 from teasim.common.registry import named
 from teasim.constants import ARMS, CONTROL_TIMESTEP
-from teasim.world.embodiments import Embodiment
+from teasim.world.bodies.embodiments import Embodiment
 
 DELTA_SHARE = 0.85
 """Share of a joint's largest speed that a full `delta` action asks for; skills use no more."""

@@ -14,7 +14,7 @@ from teasim.envs.observations import observation_space, observe
 from teasim.render import StationRenderer
 from teasim.task.recipes import allowed_next, next_correct
 from teasim.task.scoring import VIOLATION_KINDS, VIOLATIONS, Verdict, judge
-from teasim.world.looks import Look, check_look_kind, fixed_look, sample_look
+from teasim.world.looks.look import Look, check_look_kind, fixed_look, sample_look
 from teasim.world.pictures import check_cameras, check_picture
 from teasim.world.simulation import Simulation
 from teasim.world.state import SimulationState

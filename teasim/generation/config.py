@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 SIZES = (32, 1024)
 """Smallest and largest side of a video [pixels]."""
+MOST_NOISE = 0.01
+"""Largest execution noise [rad], with which about two of three attempts fail; with 0.02 all do."""
 MISTAKE_FORMAT = "NAME[@SUBTASK][+NAME...][:COUNT]"
 """How a mistake and a count are written on the command line."""
 
@@ -54,8 +56,8 @@ _MISTAKES = PrimitiveConstructorSpec[Mistakes](
 
 
 @dataclass(frozen=True)
-class GenerateConfig:
-    """The settings of a pool. They alone decide its content."""
+class PoolOptions:
+    """The settings of a pool as they are given; `GenerateConfig` checks them."""
 
     seq1: int = 10
     """Demonstrations in the optimal order, Seq_1."""
@@ -82,6 +84,9 @@ class GenerateConfig:
     """Add rests so that the length of a demonstration does not depend on its sub-tasks."""
     cameras: Annotated[tuple[str, ...], tyro.conf.arg(name="camera")] = ("left", "cup")
     """Cameras that film: left, cup, front, top."""
+    video: bool = True
+    """Film the demonstrations; a pool without video holds the joint log alone, needs no OpenGL and
+    takes 2 to 3 s of one core per demonstration."""
     size: int = 224
     """Width and height of the videos [pixels], an even number."""
     quality: str = "fast"
@@ -90,20 +95,30 @@ class GenerateConfig:
     look: str = "fixed"
     """Look of the station: fixed, or random, where light, colours, camera poses and distractors
     differ in every video."""
+    execution_noise: float = 0.0
+    """Standard deviation of a slow random disturbance of the executed joint targets [rad], at most
+    0.01; 0.005 is a good start. The logged actions stay the planned targets, so the pool shows
+    recoveries."""
     seed: int = 0
     """Seed of everything random; the same seed gives the same files."""
+
+
+@dataclass(frozen=True)
+class GenerateConfig(PoolOptions):
+    """The settings of a pool, checked. They alone decide its content."""
 
     def __post_init__(self) -> None:
         """Check every field.
 
         Raises:
-            ConfigError: a count is negative, the pool is empty, or a name or size is unknown,
-                or mistakes do not fit together.
+            ConfigError: a count is negative, the pool is empty, a name or size is unknown,
+                mistakes do not fit together, or a person is to have a joint log.
         """
         check_cameras(self.cameras)
         check_picture(self.size, self.size, self.quality)
         self._check_counts()
         self._check_participants()
+        self._check_log()
         for name in self.optional:
             if name not in OPTIONAL:
                 raise ConfigError(f"'{name}' is not optional; choose {', '.join(OPTIONAL)}.")
@@ -113,6 +128,16 @@ class GenerateConfig:
             )
         if self.seed < 0:
             raise ConfigError(f"The seed is {self.seed}; choose 0 or more.")
+
+    @property
+    def filming(self) -> tuple[str, ...]:
+        """The cameras that film; none without video."""
+        return self.cameras if self.video else ()
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the execution is disturbed."""
+        return self.execution_noise > 0
 
     @property
     def team(self) -> "tuple[Participant, ...]":
@@ -144,13 +169,26 @@ class GenerateConfig:
 
     def _check_participants(self) -> None:
         from teasim.skills.demonstrators import PARTICIPANTS
-        from teasim.world.embodiments import find_embodiment
-        from teasim.world.looks import check_look_kind
+        from teasim.world.looks.look import check_look_kind
 
-        find_embodiment(self.embodiment)
         check_look_kind(self.look)
         most = max(Counter(one.embodiment for one in PARTICIPANTS.values()).values())
         if not 1 <= self.participants <= most:
             raise ConfigError(
                 f"The number of participants is {self.participants}; choose 1 to {most}."
             )
+
+    def _check_log(self) -> None:
+        from teasim.world.bodies.embodiments import find_embodiment
+
+        logged = find_embodiment(self.embodiment).logged
+        if not 0 <= self.execution_noise <= MOST_NOISE:
+            raise ConfigError(
+                f"The execution noise is {self.execution_noise} rad; choose 0 to {MOST_NOISE}."
+            )
+        for option, given in (("--no-video", not self.video), ("--execution-noise", self.noisy)):
+            if given and not logged:
+                raise ConfigError(
+                    f"{option} needs a joint log, and '{self.embodiment}' has none; "
+                    "choose --embodiment yumi."
+                )

@@ -34,7 +34,8 @@ def generate(
         GenerationError: a demonstration never came out as labelled.
         RenderError: no headless OpenGL back end works.
     """
-    choose_gl()  # fails before anything is written if nothing can be rendered
+    if config.video:
+        choose_gl()  # fails before anything is written if nothing can be rendered
     plans = plan_pool(config)
     header = pool_header(config)
     claim_folder(Path(root), header)

@@ -1,8 +1,10 @@
 """One demonstration of a pool: carried out, checked against its labels, and written."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +21,12 @@ from teasim.task.mistakes import PlannedMistake
 from teasim.task.recipes import oven_is_on
 from teasim.task.scoring import Verdict, judge, spills
 from teasim.task.subtasks import find_subtask
-from teasim.world.embodiments import find_embodiment
-from teasim.world.looks import draw_look
+from teasim.world.bodies.embodiments import find_embodiment
+from teasim.world.looks.look import draw_look
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
+
+Film = Callable[[], dict[str, np.ndarray]]
+"""Returns a picture (H, W, 3) uint8 by camera."""
 
 ATTEMPTS = 6
 """Largest number of attempts at a demonstration that does not come out as labelled."""
@@ -32,7 +37,7 @@ def pool_header(config: GenerateConfig) -> PoolHeader:
     body = find_embodiment(config.embodiment)
     return PoolHeader(
         fps=FPS,
-        cameras=config.cameras,
+        cameras=config.filming,
         height=config.size,
         width=config.size,
         subtasks=SUBTASKS,
@@ -83,14 +88,15 @@ def _record(
         randomize=config.randomize,
         match_length=config.match_length,
         participant=participant,
+        execution_noise=config.execution_noise,
     )
     positions: list[int] = []
-    with _camera(simulation, config, demo) as renderer:
+    with _filming(simulation, config, demo) as pictures:
         rewarded = False
         for step in steps:
             success = _verdict(simulation).success
             writer.add_frame(
-                images=renderer.frames(config.cameras),
+                images=pictures(),
                 **_log(simulation, step),
                 subtask_index=SUBTASKS.index(step.subtask),
                 reward=float(success and not rewarded),
@@ -104,16 +110,22 @@ def _record(
     return reason
 
 
-def _camera(simulation: Simulation, config: GenerateConfig, demo: DemoPlan) -> StationRenderer:
+@contextmanager
+def _filming(simulation: Simulation, config: GenerateConfig, demo: DemoPlan) -> Iterator[Film]:
+    """Yield a function that returns the present picture of each camera, none without video."""
+    if not config.video:
+        yield dict
+        return
     # With randomness of its own, a pool in another look holds the same demonstrations.
     rng = np.random.default_rng([config.seed, 2, demo.index])
-    return StationRenderer(
+    with StationRenderer(
         simulation,
         width=config.size,
         height=config.size,
         quality=config.quality,
         look=draw_look(config.look, rng),
-    )
+    ) as renderer:
+        yield partial(renderer.frames, config.cameras)
 
 
 def _log(simulation: Simulation, step: Step) -> dict[str, np.ndarray | None]:

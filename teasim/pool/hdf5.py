@@ -71,7 +71,7 @@ def clips_in(path: Path, parent: Any) -> dict[str, ArrayClip | ImageClip]:
         found = {name.replace("/", "."): data for name, data in arrays(parent)}
     kinds = {name: (data, _kind(data)) for name, data in found.items()}
     return {
-        name: kind(path, data.name, 0, _checked(path, data).shape[0])
+        name: kind(path, data.name, 0, checked(path, data).shape[0])
         for name, (data, kind) in kinds.items()
         if kind is not None
     }
@@ -90,10 +90,15 @@ def logs_hash(path: Path, logs: Mapping[str, Any]) -> str:
         data = logs[name]
         numbers = data.dtype.kind in "fiub" and len(data.shape or ()) in (1, 2)
         if numbers and _kind(data) is None:
-            values = np.ascontiguousarray(_checked(path, data)[()], dtype="<f4")
+            values = np.ascontiguousarray(checked(path, data)[()], dtype="<f4")
             content.update(f"{name} {values.shape}\n".encode())
             content.update(values.tobytes())
     return content.hexdigest()
+
+
+def is_pictures(data: Any) -> bool:
+    """Tell whether an array holds pictures with three colours."""
+    return _kind(data) is not None
 
 
 def _kind(data: Any) -> type[ArrayClip] | type[ImageClip] | None:
@@ -110,7 +115,7 @@ def _kind(data: Any) -> type[ArrayClip] | type[ImageClip] | None:
     return None
 
 
-def _checked(path: Path, data: Any) -> Any:
+def checked(path: Path, data: Any) -> Any:
     """Return the array if the file can hold what it claims.
 
     Raises:

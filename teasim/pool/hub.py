@@ -13,14 +13,16 @@ REPOSITORY = re.compile(r"[A-Za-z0-9][\w\-.]*/[A-Za-z0-9][\w\-.]*")
 
 
 def located(path: Path | str) -> Path:
-    """Return `path`, or where the local copy of the data set of that name is.
-
-    What exists at `path` itself counts first. A name without a local copy is returned as it is.
-    """
+    """Return `path` if something is there, or where the local copy of that name is, or `path`."""
     place = Path(path)
-    if place.exists() or not is_repository(path):
-        return place
-    return next((copy for copy in _copies(str(path)) if copy.is_dir()), place)
+    return place if place.exists() else copy_of(str(path)) or place
+
+
+def copy_of(name: str) -> Path | None:
+    """Return where the local copy of a data set is; None if there is none."""
+    if not is_repository(name):
+        return None
+    return next((copy for copy in _copies(name) if copy.is_dir()), None)
 
 
 def is_repository(path: Path | str) -> bool:

@@ -22,6 +22,8 @@ MOTION_STEP = 5
 def leakage(pool: Pool) -> dict[str, float]:
     """AUROC of every clue in `CLUES` alone, for incorrect against correct demonstrations.
 
+    A pool without cameras has no clues in its pictures.
+
     Raises:
         PoolError: the pool does not say which demonstrations are correct, or all are the same.
     """
@@ -37,6 +39,7 @@ def leakage(pool: Pool) -> dict[str, float]:
     return {
         name: auroc([clue(pool, episode) for episode in pool.episodes], incorrect)
         for name, clue in CLUES.items()
+        if pool.cameras or name not in OF_PICTURES
     }
 
 
@@ -71,3 +74,5 @@ CLUES: Mapping[str, Callable[[Pool, Episode], float]] = MappingProxyType(
     }
 )
 """What might give a demonstration away, as a number."""
+OF_PICTURES = ("mean motion", "file size")
+"""The clues that need a camera."""

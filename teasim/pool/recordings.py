@@ -5,19 +5,36 @@ Readers of such formats make `Recording`s and hand them to `RecordedSource`.
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from teasim.common.errors import PoolError
 from teasim.pool.source import Clip
-from teasim.pool.types import Span
+from teasim.pool.types import GroundTruth, Span
 
 ID_DIGITS = 16
+"""Hexadecimal digits of an identity, 64 bits: two of a million agree with probability 3e-8."""
 
 Usage = Callable[[Path, Sequence[str], bool], list[str]]
 """(root, entries, keep): command lines that make other tools keep or leave out the entries."""
+
+
+class Log(Protocol):
+    """A log of numbers of one demonstration, read when it is asked for."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the D dimensions."""
+
+    def read(self) -> np.ndarray:
+        """Return the log, (n, D) float32.
+
+        Raises:
+            PoolError: the file is missing or damaged.
+        """
 
 
 @dataclass(frozen=True)
@@ -40,12 +57,24 @@ class Recording:
     """Logged sub-task spans in order of time."""
     task: str = ""
     """The task as a sentence; empty when it is not stored."""
-    record: None = None
-    """Whether it is correct is not stored."""
+    record: GroundTruth | None = None
+    """What is known about it; None unless it was converted from a pool that tells."""
+    logs: Mapping[str, Log] = field(default_factory=dict)
+    """Logs of numbers by name."""
+    identity: str = ""
+    """Stored identity of a demonstration that was converted; empty when none is stored."""
 
     @property
     def demo_id(self) -> str:
-        """Hash of the logs and pictures; name, number and labels stay out.
+        """The stored identity, else a hash of logs and pictures; name and number stay out.
+
+        Raises:
+            PoolError: a file is missing or damaged.
+        """
+        return self.identity or self.content_id()
+
+    def content_id(self) -> str:
+        """Return the hash of the logs and pictures.
 
         Raises:
             PoolError: a file is missing or damaged.
@@ -77,6 +106,17 @@ class Recording:
             raise PoolError(f"'{self.name}' has no camera '{camera}'; it has {known}.")
         return self.clips[camera]
 
+    def log(self, name: str) -> np.ndarray:
+        """Return a log of numbers, (n, D) float32.
+
+        Raises:
+            PoolError: there is no such log, or it is damaged.
+        """
+        if name not in self.logs:
+            known = ", ".join(self.logs) or "none"
+            raise PoolError(f"'{self.name}' has no log '{name}'; it has {known}.")
+        return self.logs[name].read()
+
 
 @dataclass(frozen=True)
 class RecordedSource:
@@ -99,6 +139,16 @@ class RecordedSource:
     has_predictions: bool = False
     """No predictions are stored."""
 
+    @property
+    def logs(self) -> dict[str, tuple[str, ...]]:
+        """Names of the dimensions of each log that all demonstrations have."""
+        first, *others = self.episodes
+        return {
+            name: log.names
+            for name, log in first.logs.items()
+            if all(name in o.logs and len(o.logs[name].names) == len(log.names) for o in others)
+        }
+
     def problems(self) -> list[str]:
         """Return nothing: opening has found what shows without decoding a picture."""
         return []
@@ -112,7 +162,7 @@ class RecordedSource:
         digest = hashlib.sha256(repr((self.fps, self.subtasks)).encode())
         for episode in self.episodes:
             pictures = [(camera, clip.digest()) for camera, clip in sorted(episode.clips.items())]
-            digest.update(repr((episode.demo_id, pictures, episode.labels)).encode())
+            digest.update(repr((episode.content_id(), pictures, episode.labels)).encode())
         return digest.hexdigest()
 
     def entries(self, indexes: Sequence[int]) -> list[str]:

@@ -60,11 +60,13 @@ class LabelledSequence:
         return () if labels is None else joined_spans(labels, self.folder.names)
 
     def predicted_spans(self) -> tuple[Span, ...]:
-        """Return the predicted segments.
+        """Return the predicted segments; none where the folder has no predictions.
 
         Raises:
-            PoolError: the labels are missing or damaged.
+            PoolError: other videos have predictions but this one does not, or they are damaged.
         """
+        if not self.folder.prediction_files:
+            return ()
         return joined_spans(self.folder.predictions(self.demo_id), self.folder.names)
 
     def posteriors(self) -> NDArray[np.float32] | None:
@@ -82,6 +84,14 @@ class LabelledSequence:
             PoolError: always.
         """
         raise PoolError(f"'{self.folder.root}' has no pictures, so it has no camera '{camera}'.")
+
+    def log(self, name: str) -> np.ndarray:
+        """Refuse: there are no logs.
+
+        Raises:
+            PoolError: always.
+        """
+        raise PoolError(f"'{self.folder.root}' has no logs of numbers, so it has no '{name}'.")
 
 
 @dataclass(frozen=True)
@@ -121,9 +131,9 @@ class SequencePool:
         return cls(folder.root, folder.names, tuple(episodes), fps)
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What was decided where the files leave a doubt, one sentence each."""
-        return self.episodes[0].folder.notes()
+    def logs(self) -> dict[str, tuple[str, ...]]:
+        """None: there are no logs of numbers."""
+        return {}
 
     def problems(self) -> list[str]:
         """Return a sentence for each label file that is damaged."""
@@ -140,6 +150,11 @@ class SequencePool:
     def has_predictions(self) -> bool:
         """Whether predictions are stored for every video."""
         return all(e.demo_id in e.folder.prediction_files for e in self.episodes)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided where the files leave a doubt, one sentence each."""
+        return self.episodes[0].folder.notes()
 
     def content_hash(self) -> str:
         """Return a SHA-256 over the names and labels of all videos."""

@@ -4,7 +4,7 @@ A reader (`teasim.pool.readers`) opens a folder or file and returns a `Source`. 
 works on these protocols and knows no format.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -119,6 +119,16 @@ class Demonstration(Protocol):
             PoolError: The source has no such camera.
         """
 
+    def log(self, name: str) -> np.ndarray:
+        """Return the log `name`, one of `Source.logs`.
+
+        Returns:
+            (n, D) float32, a row per frame.
+
+        Raises:
+            PoolError: There is no such log, or it is damaged.
+        """
+
 
 class Source(Protocol):
     """Demonstrations that can be filtered; a source is never modified."""
@@ -142,6 +152,15 @@ class Source(Protocol):
     @property
     def has_predictions(self) -> bool:
         """Whether a segmenter stored the spans of every demonstration in the source."""
+
+    @property
+    def logs(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the dimensions of each log of numbers that all demonstrations have.
+
+        Logs are named as LeRobot names its features: `action`, `observation.state`,
+        `observation.environment_state`, `observation.KEY` for others, `next.reward` and
+        `next.success`.
+        """
 
     @property
     def episodes(self) -> Sequence[Demonstration]:

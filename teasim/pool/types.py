@@ -22,8 +22,11 @@ class Span:
     """The frames `start <= frame < stop` in which a sub-task was carried out."""
 
     subtask: str
+    """Name of the sub-task."""
     start: int
+    """First frame."""
     stop: int
+    """Frame after the last one."""
 
     def __post_init__(self) -> None:
         """Refuse an empty span."""
@@ -38,9 +41,13 @@ class MistakeSpan:
     """
 
     name: str
+    """Kind of mistake."""
     subtask: str
+    """Name of the sub-task."""
     start: int
+    """First frame."""
     stop: int
+    """Frame after the last one."""
 
     def __post_init__(self) -> None:
         """Refuse a span that ends before it starts."""
@@ -103,7 +110,7 @@ class PoolHeader:
     fps: int
     """Frames per second, also the rate of the joint log."""
     cameras: tuple[str, ...]
-    """Short camera names, e.g. left and cup."""
+    """Short camera names, e.g. left and cup; empty for a pool that holds the joint log alone."""
     height: int
     """Height of a frame in pixels; even, as yuv420p needs it."""
     width: int
@@ -144,8 +151,11 @@ class Run(NamedTuple):
     """Frames start <= frame < stop with one label."""
 
     label: int
+    """Label of its frames."""
     start: int
+    """First frame."""
     stop: int
+    """Frame after the last one."""
 
     @property
     def length(self) -> int:
@@ -215,8 +225,8 @@ def _check_numbers(header: PoolHeader) -> None:
 
 
 def _check_names(header: PoolHeader) -> None:
-    if not header.cameras:
-        raise PoolError("The header names no camera; a pool needs one or more.")
+    if not header.cameras and header.state_names is None:
+        raise PoolError("The header names neither a camera nor a joint log; a pool needs one.")
     for camera in header.cameras:
         if not CAMERA_NAME.fullmatch(camera):
             raise PoolError(

@@ -3,14 +3,13 @@
 import csv
 import io
 import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 from teasim.common.errors import PoolError
 from teasim.common.files import write_text
-from teasim.pool.lerobot.identity import halves
+from teasim.pool.lerobot.identity import matched
 
 
 @dataclass(frozen=True)
@@ -93,26 +92,15 @@ def read_weight_table(path: Path | str) -> tuple[WeightRow, ...]:
 def match_rows(rows: Sequence[WeightRow], identities: Sequence[str]) -> list[WeightRow | None]:
     """Return the row of each demonstration, None for one that the table does not know.
 
-    A row fits by its whole `demo_id`. Where other tools have removed features or encoded the
-    videos anew, one half of it is enough (`teasim.pool.lerobot.identity`), if that half tells the
-    demonstration from all others of the table and of the pool.
+    A row fits by its `demo_id` or a half of it; see `teasim.pool.lerobot.identity.matched`.
 
     Args:
         rows: The weight table.
         identities: `demo_id` of each demonstration.
     """
-    whole = {row.demo_id: row for row in rows}
-    told = Counter(half for row in rows for half in halves(row.demo_id))
-    asked = Counter(half for identity in identities for half in halves(identity))
-    by_half = {half: row for row in rows for half in halves(row.demo_id) if told[half] == 1}
-
-    def found(identity: str) -> WeightRow | None:
-        if identity in whole:
-            return whole[identity]
-        known = [by_half[h] for h in halves(identity) if h in by_half and asked[h] == 1]
-        return known[0] if known else None
-
-    return [found(identity) for identity in identities]
+    own = {row.demo_id: row for row in rows}
+    told = matched(list(own), identities)
+    return [None if identity is None else own[identity] for identity in told]
 
 
 def _parse(path: Path, line: int, cells: Sequence[str]) -> WeightRow:

@@ -10,8 +10,8 @@ from teasim.common.errors import ConfigError
 from teasim.constants import ARMS
 from teasim.skills.style import Style
 from teasim.task.recipes import SEQ_1, is_legal, moved
-from teasim.world.embodiments import EMBODIMENTS
-from teasim.world.person import Appearance
+from teasim.world.bodies.embodiments import EMBODIMENTS
+from teasim.world.bodies.person import Appearance
 
 Range = tuple[float, float]
 

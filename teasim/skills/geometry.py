@@ -1,39 +1,46 @@
-"""Small pieces of rigid-body geometry the skills share. Poses are `mink.SE3`."""
+"""Rigid-body geometry for the skills. Poses are `mink.SE3` in the world frame."""
 
 import numpy as np
 from mink import SE3, SO3
 
 DOWN = np.array([0.0, 0.0, -1.0])
+"""Unit vector (3,) towards the ground."""
 UP = np.array([0.0, 0.0, 1.0])
+"""Unit vector (3,) away from the ground."""
 
 
 def pose(position: np.ndarray, rotation: np.ndarray) -> SE3:
-    """Pose from a position (3,) [m] and a rotation matrix (3, 3)."""
+    """Return the pose with a position (3,) [m] and a rotation matrix (3, 3)."""
     return SE3.from_rotation_and_translation(SO3.from_matrix(rotation), np.asarray(position))
 
 
 def position(of: SE3) -> np.ndarray:
-    """Position (3,) [m]."""
+    """Return the position of a pose (3,) [m]."""
     return np.asarray(of.translation())
 
 
 def rotation(of: SE3) -> np.ndarray:
-    """Rotation matrix (3, 3)."""
+    """Return the rotation matrix of a pose (3, 3)."""
     return np.asarray(of.rotation().as_matrix())
 
 
 def shifted(start: SE3, offset: np.ndarray) -> SE3:
-    """The pose moved by `offset` (3,) [m] in world axes."""
+    """Return the pose moved by `offset` (3,) [m] in world axes."""
     return pose(position(start) + offset, rotation(start))
 
 
 def about(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation matrix (3, 3) about a unit `axis` (3,) by `angle` [rad]."""
+    """Return the rotation matrix (3, 3) about a unit `axis` (3,) by `angle` [rad]."""
     return np.asarray(SO3.exp(np.asarray(axis) * angle).as_matrix())
 
 
 def tool(forward: np.ndarray, closing: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a gripper that points along `forward` and closes along `closing`."""
+    """Return the rotation matrix (3, 3) of a gripper.
+
+    Args:
+        forward: Direction in which it points (3,), of any length.
+        closing: Direction in which it closes (3,); its part along `forward` is removed.
+    """
     z = forward / np.linalg.norm(forward)
     x = closing - z * (closing @ z)
     x = x / np.linalg.norm(x)
@@ -41,12 +48,12 @@ def tool(forward: np.ndarray, closing: np.ndarray) -> np.ndarray:
 
 
 def flipped(grasp: SE3) -> SE3:
-    """The same grasp with the two fingers exchanged."""
+    """Return the same grasp with the two fingers exchanged."""
     return pose(position(grasp), rotation(grasp) @ np.diag([-1.0, -1.0, 1.0]))
 
 
 def between(start: SE3, end: SE3, share: float) -> SE3:
-    """Straight line in position, shortest turn in orientation; `share` in [0, 1]."""
+    """Interpolate along a straight line and the shortest rotation; `share` in [0, 1]."""
     turn = start.rotation().inverse() @ end.rotation()
     orientation = start.rotation() @ SO3.exp(turn.log() * share)
     middle = position(start) + (position(end) - position(start)) * share
@@ -54,14 +61,14 @@ def between(start: SE3, end: SE3, share: float) -> SE3:
 
 
 def turn_angle(start: SE3, end: SE3) -> float:
-    """Angle of the shortest turn from one orientation to the other [rad]."""
+    """Return the angle of the shortest rotation between two orientations [rad]."""
     return float(np.linalg.norm((start.rotation().inverse() @ end.rotation()).log()))
 
 
 def ease(share: np.ndarray) -> np.ndarray:
-    """Minimum-jerk timing: rest to rest, peak speed 1.875 times the mean."""
+    """Return minimum-jerk progress (n,) for shares of time (n,), both 0 to 1."""
     return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
 
 
 EASE_PEAK = 1.875
-"""Peak of the derivative of `ease`."""
+"""Peak of the derivative of `ease`, whose mean is 1."""

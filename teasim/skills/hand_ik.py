@@ -5,7 +5,7 @@ from mink import SE3
 
 from teasim.common.errors import SkillError
 from teasim.skills.geometry import about, pose, position, rotation
-from teasim.world.person import HAND_RANGE, POINTING_DOWN
+from teasim.world.bodies.person import HAND_RANGE, POINTING_DOWN
 
 _AXES = np.eye(3)
 

@@ -11,7 +11,7 @@ from teasim.common.errors import SkillError
 from teasim.constants import ARM_JOINTS
 from teasim.skills.geometry import position
 from teasim.skills.hand_ik import HandKinematics
-from teasim.world.yumi import READY, planning_model
+from teasim.world.bodies.yumi import READY, planning_model
 
 POSITION_TOLERANCE = 5e-4
 """Largest position error of a solution [m]."""

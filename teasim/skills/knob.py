@@ -1,4 +1,4 @@
-"""Turning the oven's knob: grasp its bar from above, turn the wrist by a quarter."""
+"""The skills that turn the oven on and off: grasp the knob from above and turn it by 90 degrees."""
 
 import numpy as np
 from mink import SE3
@@ -15,11 +15,11 @@ GRASP_HEIGHT = 0.025
 TURN = np.pi / 2
 """Angle between off and on [rad]."""
 SHORT_TURN = 0.4
-"""Share of the turn when it is not far enough: neither on nor off is reached."""
+"""Share of the turn of the ineffective manner; it reaches neither on nor off."""
 
 
 def turn_knob_to(arm: Arm, goal: float, manner: Manner) -> Motion:
-    """Turn the knob to `goal` [rad] and let it go; not far enough, or not at all, if told so."""
+    """Turn the knob to `goal` [rad]; not far enough if ineffective, not at all if abandoned."""
     angle, place = _knob(arm.simulation)
     across = np.array([-np.sin(angle), np.cos(angle), 0.0])
     grasp = arm.easier(pose(place + GRASP_HEIGHT * UP, tool(DOWN, across)))

@@ -8,7 +8,7 @@ import numpy as np
 from teasim.constants import ARMS, CONTROL_TIMESTEP
 from teasim.skills.style import Style
 from teasim.task.subtasks import ROWS
-from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.bodies.embodiments import EMBODIMENTS
 from teasim.world.simulation import Simulation
 
 STRETCH = (1.3, 1.5)

@@ -1,4 +1,4 @@
-"""Taking the spoon from its holder, stirring the cup, and putting the spoon back."""
+"""The skill that takes the spoon from its holder, stirs the cup, and puts the spoon back."""
 
 import numpy as np
 from mink import SE3
@@ -15,9 +15,9 @@ OPENING = 0.024
 TIP_HEIGHT = 0.016
 """Height of the spoon's tip above the cup's underside while stirring [m]."""
 ABOVE = 0.058
-"""The same when the spoon never gets wet [m]: a full cup holds liquid up to 0.044."""
+"""The same for the ineffective manner [m]; the liquid in a full cup reaches 0.044 m."""
 CLEAR_HEIGHT = 0.10
-"""Height of the spoon's tip on its way [m]: above the rim and above the holder."""
+"""Height of the spoon's tip between holder and cup [m]."""
 RADIUS = 0.015
 """Radius of the stirring circle [m]."""
 TURNS_PER_SECOND = 1.0
@@ -25,10 +25,10 @@ TURNS_PER_SECOND = 1.0
 
 
 def stir(arm: Arm, manner: Manner) -> Motion:
-    """Stir the cup and put the spoon back; above the liquid, or not at all, if told so.
+    """Stir the cup and put the spoon back; above the liquid if ineffective, not if abandoned.
 
     Raises:
-        SkillError: the spoon does not stand in its holder.
+        SkillError: the spoon is not upright in its holder.
     """
     simulation = arm.simulation
     leaning = _spoon_pose(simulation)
@@ -39,7 +39,7 @@ def stir(arm: Arm, manner: Manner) -> Motion:
     standing = _standing(simulation)
     cup = pose(simulation.data.body(body_name("cup")).xpos.copy(), rotation(standing))
     up = shifted(standing, CLEAR_HEIGHT * UP) @ held
-    # Upright before it is drawn: leaning, the bowl would catch on the holder's wall.
+    # The spoon is made upright before it is lifted: tilted, its bowl would catch on the wall.
     yield from arm.line(shifted(standing, 0.002 * UP) @ held, arm.APPROACH_SPEED)
     yield from arm.line(up)
     if manner == ABANDONED:
@@ -53,7 +53,7 @@ def stir(arm: Arm, manner: Manner) -> Motion:
 
 
 def _round(arm: Arm, cup: SE3, held: SE3, height: float) -> Motion:
-    """Go to the cup, in, round and round with the spoon's tip at `height` [m], and out again."""
+    """Move to the cup, stir with the spoon's tip at `height` [m], and leave the cup."""
     start = _beside_bag(arm.simulation)
     turns = 2 * np.pi * arm.style.stir_turns
 
@@ -71,7 +71,7 @@ def _round(arm: Arm, cup: SE3, held: SE3, height: float) -> Motion:
 
 
 def _beside_bag(simulation: Simulation) -> float:
-    """Angle of the stirring circle at which the spoon goes in without standing on the bag [rad]."""
+    """Return the angle on the circle [rad] at which the spoon enters beside the tea bag."""
     cup = simulation.data.body(body_name("cup")).xpos
     leaning = (simulation.data.site("tea_bag/grasp").xpos - cup)[:2]
     flat = simulation.data.body(body_name("tea_bag")).xmat.reshape(3, 3)[:2, 1]
@@ -80,7 +80,7 @@ def _beside_bag(simulation: Simulation) -> float:
 
 
 def _standing(simulation: Simulation) -> SE3:
-    """The spoon upright in the middle of its holder."""
+    """Return the pose of the spoon upright in the middle of its holder."""
     holder = simulation.data.body(body_name("spoon_holder"))
     return pose(holder.xpos.copy(), holder.xmat.reshape(3, 3).copy())
 

@@ -1,4 +1,4 @@
-"""Lifting the tea bag by its tag and letting it drop into the cup."""
+"""The skill that lifts the tea bag by its tag and drops it into the cup."""
 
 import numpy as np
 
@@ -11,18 +11,18 @@ from teasim.world.station import body_name
 OPENING = 0.024
 """Opening of the gripper around the tag [m]."""
 CARRY_HEIGHT = 0.21
-"""Height of the hand on its way to the cup [m]: the bag passes above the spoon."""
+"""Height of the hand between holder and cup [m]; the bag passes above the spoon."""
 DROP_HEIGHT = 0.095
-"""Height of the hand when it lets go over the cup's underside [m]."""
+"""Height of the hand above the cup's underside at the release [m]."""
 BESIDE = np.array([0.10, 0.03, 0.0])
-"""Where a bag that misses the cup goes, seen from the cup [m]: out of everybody's way."""
+"""Place of the ineffective release relative to the cup (3,) [m]; the bag hinders no other skill."""
 
 
 def add_tea_bag(arm: Arm, manner: Manner) -> Motion:
-    """Put the tea bag into the cup; beside it, or back into its holder, if told so.
+    """Put the tea bag into the cup; beside it if ineffective, back into its holder if abandoned.
 
     Raises:
-        SkillError: the bag is in the cup already, or lies where the gripper cannot take its tag.
+        SkillError: the bag is in the cup already, or is not upright in its holder.
     """
     simulation = arm.simulation
     if simulation.recogniser.bag_in_cup:
@@ -47,7 +47,7 @@ def add_tea_bag(arm: Arm, manner: Manner) -> Motion:
 
 
 def _drop(arm: Arm, place: np.ndarray) -> Motion:
-    """Carry the bag over `place` (3,) [m], lower it and let it fall."""
+    """Carry the bag above `place` (3,) [m], lower it and release it."""
     hand = rotation(arm.tcp)
     yield from arm.line(pose(place + CARRY_HEIGHT * UP, hand))
     yield from arm.line(pose(place + DROP_HEIGHT * UP, hand), 0.25)

@@ -1,4 +1,4 @@
-"""Counts how often something begins to touch what it must not."""
+"""Counter of the forbidden contacts that begin."""
 
 from itertools import combinations_with_replacement
 
@@ -11,10 +11,10 @@ from teasim.world.state import Saved
 
 
 class CollisionCounter(Saved):
-    """Looks at a simulation's contacts after every update.
+    """Counts forbidden contacts of a simulation after every update.
 
-    A contact begins when a pair of roles, the right arm and the table say, touches that did not
-    touch an update ago; how many of their shapes do is not counted.
+    A contact begins when a pair of roles, for example the right arm and the table, touches and did
+    not touch at the update before, whatever the number of shapes that touch.
     """
 
     SAVED = ("begun", "touching")
@@ -27,11 +27,11 @@ class CollisionCounter(Saved):
         simulation.observers.append(self._look)
 
     def reset(self) -> None:
-        """Count from zero."""
+        """Set the count to zero."""
         self.begun = 0
         """Forbidden contacts that began since the last reset."""
         self.touching: frozenset[int] = frozenset()
-        """Kinds of forbidden contacts there are now, numbered as by `forbidden_kinds`."""
+        """Present forbidden contacts, numbered by `forbidden_kinds`."""
 
     def _look(self) -> None:
         touching: frozenset[int] = frozenset()
@@ -46,7 +46,7 @@ class CollisionCounter(Saved):
 
 
 def forbidden_kinds(model: mujoco.MjModel) -> np.ndarray:
-    """For two shapes the number of the forbidden pair of roles they are, or 0 (ngeom, ngeom)."""
+    """Return the number of the forbidden pair of roles of any two shapes, or 0 (ngeom, ngeom)."""
     names = roles(model)
     distinct = sorted(set(names))
     kinds = np.zeros((len(distinct), len(distinct)), np.int64)

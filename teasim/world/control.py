@@ -1,14 +1,14 @@
-"""From one target per control step to smooth motor commands at every update."""
+"""Motor commands at every update, interpolated from one target per control step."""
 
 import mujoco
 import numpy as np
 
 from teasim.constants import ARMS, CONTROL_TIMESTEP, UPDATES_PER_CONTROL
-from teasim.world.embodiments import YUMI, Embodiment
+from teasim.world.bodies.embodiments import YUMI, Embodiment
 from teasim.world.state import Saved
 
 BLOCKED_LAG = 0.004
-"""A closing finger this far behind its command is held by something [m]."""
+"""A closing finger that lags its command by more than this is blocked by an object [m]."""
 
 _S = (np.arange(UPDATES_PER_CONTROL)[:, None] + 0.5) / UPDATES_PER_CONTROL
 # Hermite cubic with given slopes at both ends, and its derivative (updates, 1).
@@ -19,9 +19,9 @@ _START_SLOPE, _END_SLOPE = 1 - 4 * _S + 3 * _S**2, 4 * _S - 3 * _S**2
 class Controller(Saved):
     """Position control of both arms and grippers.
 
-    Within a control step the arms follow a cubic from the last target to the new one whose end
-    velocity is the step's mean velocity. So a log of targets at 10 Hz is all there is to replay,
-    and the motors still see a continuous velocity, which they need to carry things without jerks.
+    Within a control step the arms follow a cubic from the last target to the new one; its final
+    velocity is the mean velocity of the step. A log of targets at 10 Hz is therefore enough for a
+    replay, and the velocity is continuous, which keeps carried objects from slipping.
     """
 
     SAVED = ("_position", "_velocity", "_fingers")
@@ -45,32 +45,35 @@ class Controller(Saved):
         self._fingers = np.zeros(2)
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Hold the present positions."""
+        """Hold the present joint positions and openings."""
         state = self.measured(data)
         self._position, self._velocity = state[: self._count].copy(), np.zeros(self._count)
         self._fingers = state[self._count :] / 2
 
     def measured(self, data: mujoco.MjData) -> np.ndarray:
-        """Joint angles [rad] and gripper openings [m] (2 n + 2,): right, left, openings."""
+        """Return the measured joint angles [rad] and gripper openings [m] (2 n + 2,).
+
+        The order is the right arm, the left arm, both openings.
+        """
         return np.concatenate(
             [data.qpos[self._joint_addresses], 2 * data.qpos[self._finger_addresses]]
         )
 
     def commands(self, target: np.ndarray, data: mujoco.MjData) -> "_Segment":
-        """Start the control step towards `target` (2 n + 2,)."""
+        """Start a control step towards `target` (2 n + 2,): angles [rad] and openings [m]."""
         goal = np.clip(target[: self._count], self._limits[:, 0], self._limits[:, 1])
         segment = _Segment(self, self._position, self._velocity, goal, target[self._count :] / 2)
         self._velocity = (goal - self._position) / CONTROL_TIMESTEP
         self._position = goal
         opening = target[self._count :] / 2 > self._fingers
-        # An opening hand starts from where its fingers are, not from the squeeze far inside.
+        # Opening starts at the measured position: the command of a squeeze lies inside the object.
         present = data.qpos[self._finger_addresses]
         self._fingers = np.where(opening, np.maximum(self._fingers, present), self._fingers)
         return segment
 
 
 class _Segment:
-    """The cubic of one control step."""
+    """The interpolated commands of one control step."""
 
     def __init__(
         self,
@@ -89,10 +92,10 @@ class _Segment:
         self._arms = np.clip(position + lead, *controller._limits.T)  # (updates, 14)
 
     def apply(self, update: int, data: mujoco.MjData) -> None:
-        """Write the motor commands of one of the step's updates."""
+        """Write the motor commands of update number `update` of this step."""
         control = self._controller
         data.ctrl[control._arm_actuators] = self._arms[update]
-        # Blocked fingers do not move, so nothing keeps the force from building up at once.
+        # A blocked finger does not move, so its command may approach the goal faster.
         present = data.qpos[control._finger_addresses].tolist()
         for finger, (goal, at) in enumerate(zip(self.fingers, present, strict=True)):
             command = float(control._fingers[finger])

@@ -99,7 +99,7 @@ def held_volume(vessel: Vessel, tilt: float) -> float:
 
 
 def puddle_shape(content: str, lobe: int) -> str:
-    """Return the name of the shape, half an ellipsoid on the table, that shows a lobe."""
+    """Return the name of the shape, half an ellipsoid on table or hob, that shows a lobe."""
     return f"spill_{content}_{lobe}"
 
 
@@ -128,8 +128,34 @@ def _puddle_volume() -> float:
     return float(np.max(lobes, axis=0).sum() * (places[1] - places[0]) ** 2)
 
 
+class Ground:
+    """The surfaces that liquid lands on: the table's top at z = 0 and the hob's above it."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        hob = model.geom("hob")
+        centre = model.body(hob.bodyid[0]).pos + hob.pos
+        self._low, self._high = centre[:2] - hob.size[:2], centre[:2] + hob.size[:2]
+        self._top = float(centre[2] + hob.size[2])
+
+    def height(self, place: np.ndarray) -> float:
+        """Return the height of the surface below a place (x, y, ...) [m]."""
+        on_hob = (self._low <= place[:2]).all() and (place[:2] <= self._high).all()
+        return self._top if on_hob else 0.0
+
+    def landed(self, place: np.ndarray, radius: float) -> np.ndarray:
+        """Return where a lobe of this `radius` [m] around `place` (2,) [m] lies (3,) [m].
+
+        On the hob it keeps inside the edges, over which liquid would not hang.
+        """
+        height = self.height(place)
+        if height:
+            inset = np.minimum(radius, (self._high - self._low) / 2)
+            place = np.clip(place, self._low + inset, self._high - inset)
+        return np.append(place, height)
+
+
 class Liquids(Saved):
-    """Amounts in the vessels, in the cup and on the table.
+    """Amounts in the vessels, in the cup, and on table and hob.
 
     The masses of the bodies do not change: the grasps hold the 25 to 100 g that move anyway, and a
     change of mass during a contact makes light vessels jump.
@@ -141,6 +167,7 @@ class Liquids(Saved):
         self._vessel_bodies = {name: model.body(body_name(name)).id for name in VESSELS}
         self._spouts = {name: model.site(f"{name}/spout").id for name in VESSELS}
         self._cup = model.body(body_name("cup")).id
+        self._ground = Ground(model)
         painted = [*(f"{name}/content" for name in VESSELS), "cup/content", "cup/sugar"]
         painted += [puddle_shape(name, lobe) for name in CONTENTS for lobe in range(len(LOBES))]
         self._painted = [model.geom(name).id for name in painted]
@@ -153,7 +180,7 @@ class Liquids(Saved):
         self.cup = dict.fromkeys(CONTENTS, 0.0)
         """Amount of every content in the cup [ml or g]."""
         self.spilled = dict.fromkeys(CONTENTS, 0.0)
-        """Amount of every content on the table [ml or g]."""
+        """Amount of every content on table and hob [ml or g]."""
         self.puddles = {content: np.zeros(2) for content in CONTENTS}
         """Where every content was spilled, on the average (2,) [m]."""
         self.tea = 0.0
@@ -199,7 +226,7 @@ class Liquids(Saved):
             share = amount / self.spilled[vessel.content]
             puddle = self.puddles[vessel.content]
             self.puddles[vessel.content] = puddle + share * (spout[:2] - puddle)
-            end = np.array([*spout[:2], 0.0])
+            end = np.array([*spout[:2], self._ground.height(spout)])
         if amount < 0.02 * FLOW_LIMIT * dt:
             return None  # the last drops are too few to be seen
         return Stream(spout, end, _STREAMS[vessel.content])
@@ -242,7 +269,8 @@ class Liquids(Saved):
         radius, height = puddle_size(content, amount)
         for number, (x, y, share) in enumerate(LOBES):
             shape = model.geom(puddle_shape(content, number))
-            shape.pos[:2] = self.puddles[content] + radius * np.array([x, y])
+            place = self.puddles[content] + radius * np.array([x, y])
+            shape.pos[:] = self._ground.landed(place, share * radius)
             shape.size[:] = (share * radius, share * radius, share * height)
             shape.rgba[:] = (*_PUDDLES[content], 1.0 if amount > 1 else 0.0)
 

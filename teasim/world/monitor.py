@@ -1,4 +1,4 @@
-"""Watches a running station for what the real robot must not do: bumping, hurrying, pressing."""
+"""Records collisions, speeds and contact depths that a real robot must not exceed."""
 
 from collections.abc import Sequence
 
@@ -6,21 +6,21 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARMS
-from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.bodies.embodiments import EMBODIMENTS
 from teasim.world.simulation import Simulation
 
 TCP_SPEED_LIMIT = 1.5
 """Largest speed of the tool centre point [m/s] (ABB controller configuration)."""
 PENETRATION_LIMIT = 0.003
-"""Deeper contacts than this mean that something was pressed through something else [m]."""
+"""Largest admissible depth of a contact [m]; deeper ones mean that one object entered another."""
 KEEP_OFF = ("torso", "table", "hob", "cup")
-"""What no part of a robot arm but its fingers may touch, besides the other arm."""
+"""Roles that an arm, without its fingers, must not touch; the other arm is forbidden as well."""
 
 Pair = tuple[str, str]
 
 
 def roles(model: mujoco.MjModel) -> tuple[str, ...]:
-    """What each shape belongs to (ngeom,): an arm, its fingers, the torso, or a thing by name."""
+    """Return what each shape belongs to (ngeom,): an arm, its fingers, the torso, or an object."""
     return tuple(_role(model, geom) for geom in range(model.ngeom))
 
 
@@ -36,7 +36,7 @@ def _role(model: mujoco.MjModel, geom: int) -> str:
 
 
 class Monitor:
-    """Looks at a simulation after every update and keeps the extremes."""
+    """Observes a simulation after every update and keeps the extremes."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -48,7 +48,7 @@ class Monitor:
         self._limits = np.tile(simulation.embodiment.speeds, len(ARMS))
         self._before = (np.inf, np.zeros((len(ARMS), 3)))
         self.touches: dict[Pair, float] = {}
-        """Deepest penetration of every pair of roles that touched [m], names in order."""
+        """Deepest penetration of each pair of roles that touched [m]; the names are sorted."""
         self.joint_speed = 0.0
         """Largest joint speed as a share of that joint's limit."""
         self.tcp_speed = 0.0
@@ -57,12 +57,12 @@ class Monitor:
 
     @property
     def penetration(self) -> float:
-        """Deepest penetration of all [m]."""
+        """Deepest penetration of any contact [m]."""
         return max(self.touches.values(), default=0.0)
 
     @property
     def forbidden(self) -> tuple[Pair, ...]:
-        """Pairs that touched and must not."""
+        """Pairs of roles that touched and must not."""
         return tuple(pair for pair in sorted(self.touches) if is_forbidden(pair))
 
     def _look(self) -> None:
@@ -85,7 +85,7 @@ class Monitor:
 
 
 def is_forbidden(pair: Sequence[str]) -> bool:
-    """Whether what has these two roles must not touch."""
+    """Whether contact between these two roles is forbidden."""
     arms = [role for role in pair if role.endswith("_arm")]
     sides = {role.partition("_")[0] for role in pair if role.endswith(("_arm", "_fingers"))}
     return len(sides) > 1 or bool(arms and set(pair) & set(KEEP_OFF))

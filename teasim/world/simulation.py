@@ -1,4 +1,4 @@
-"""One running station: physics, liquids and events, advanced one control step at a time."""
+"""A running station: physics, liquids and events, advanced one control step at a time."""
 
 from collections.abc import Callable
 
@@ -11,16 +11,16 @@ from teasim.constants import (
     STEPS_PER_UPDATE,
     UPDATES_PER_CONTROL,
 )
+from teasim.world.bodies.embodiments import find_embodiment
+from teasim.world.bodies.person import Appearance, wear
 from teasim.world.control import Controller
-from teasim.world.embodiments import find_embodiment
 from teasim.world.events import Event, Recogniser
 from teasim.world.liquids import CONTENTS, VESSELS, Liquids, Stream
-from teasim.world.person import Appearance, wear
 from teasim.world.state import PhysicsState, SimulationState
 from teasim.world.station import FREE_BODIES, Layout, body_name, place, station_model
 
 SETTLE_TIME = 0.8
-"""Things come to rest for this long before an episode starts [s]."""
+"""Time in which objects come to rest before an episode starts [s]."""
 _UPDATE = PHYSICS_TIMESTEP * STEPS_PER_UPDATE
 
 ENVIRONMENT_STATE_NAMES = (
@@ -33,20 +33,20 @@ ENVIRONMENT_STATE_NAMES = (
     "cup_tea",
     "cup_mixed",
 )
-"""Columns of the environment state: poses [m, wxyz], knob [m, rad], amounts [ml or g], shares."""
+"""Names of the environment state: poses [m, wxyz], knob [m, rad], amounts [ml or g], shares."""
 
 
 class Simulation:
     """The tea-making station.
 
-    `model` and `data` may be read; whoever writes them is outside the contract.
+    `model` and `data` may be read and must not be written.
     """
 
     def __init__(self, embodiment: str = "yumi") -> None:
         """Build the station.
 
         Raises:
-            ConfigError: there is no such embodiment.
+            ConfigError: the embodiment is unknown.
         """
         self.embodiment = find_embodiment(embodiment)
         self.model = station_model(embodiment)
@@ -62,10 +62,10 @@ class Simulation:
         self._glow = [self.model.geom("plate").id, self.model.geom("pilot").id]
         self.target = np.zeros(2 * self.embodiment.width + 2)
         self.observers: list[Callable[[], None]] = []
-        """Called after every update, to look at the station and not to change it."""
+        """Functions that are called after every update; they must not change the station."""
 
     def reset(self, layout: Layout) -> None:
-        """Set everything to `layout`, the arms to READY, and let things come to rest."""
+        """Set objects to `layout` and arms to their start pose, and let everything come to rest."""
         mujoco.mj_resetData(self.model, self.data)
         place(self.model, self.data, layout)
         body = self.embodiment
@@ -86,13 +86,17 @@ class Simulation:
         """Give the person at the station the colours of `appearance`."""
         wear(self.model, appearance)
 
-    def step(self, target: np.ndarray) -> None:
-        """Advance one control step towards `target`: joint angles [rad], openings [m].
+    def step(self, target: np.ndarray, offset: np.ndarray | None = None) -> None:
+        """Advance one control step towards `target`.
 
-        The shape of `target` is (16,) for YuMi, (2 n + 2,) for a body with n joints per arm.
+        Args:
+            target: Joint angles [rad] and openings [m] (2 n + 2,), n joints per arm; YuMi has 7.
+            offset: Disturbance of the same shape that is added to what the motors follow, and not
+                to `self.target`, from which the skills plan.
         """
         self.target = np.array(target, dtype=float)
-        segment = self._controller.commands(self.target, self.data)
+        followed = self.target if offset is None else self.target + offset
+        segment = self._controller.commands(followed, self.data)
         for update in range(UPDATES_PER_CONTROL):
             segment.apply(update, self.data)
             mujoco.mj_step(self.model, self.data, nstep=STEPS_PER_UPDATE)
@@ -107,7 +111,7 @@ class Simulation:
                 observer()
 
     def get_state(self) -> SimulationState:
-        """Everything the station's future depends on, apart from the targets to come."""
+        """Return everything that the future of the station depends on, apart from targets."""
         return SimulationState(
             PhysicsState.of(self.model, self.data),
             self.target.copy(),
@@ -117,10 +121,10 @@ class Simulation:
         )
 
     def set_state(self, state: SimulationState) -> None:
-        """Go back to `state`: the same targets then give the same bits as they gave from there.
+        """Restore `state`; the same targets then give the same bits as before.
 
         Raises:
-            ConfigError: the state was taken from another kind of station.
+            ConfigError: the state belongs to another kind of station.
         """
         state.physics.restore(self.model, self.data)
         self.target = state.target.copy()
@@ -130,30 +134,30 @@ class Simulation:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """Sub-tasks that happened so far, in order."""
+        """Recognised sub-tasks in order of time."""
         return tuple(self.recogniser.events)
 
     @property
     def subtasks_done(self) -> tuple[str, ...]:
-        """Names of the sub-tasks that happened so far, in order."""
+        """Names of the recognised sub-tasks in order of time."""
         return tuple(event.subtask for event in self.recogniser.events)
 
     @property
     def oven_on(self) -> bool:
-        """Whether the oven is on now."""
+        """Whether the oven is on."""
         return self.recogniser.oven_on
 
     @property
     def streams(self) -> tuple[Stream, ...]:
-        """Streams in the air now."""
+        """Present streams in the air."""
         return self.liquids.streams
 
     def joint_state(self) -> np.ndarray:
-        """Measured joint angles [rad] and gripper openings [m] (2 n + 2,) float32."""
+        """Return the measured joint angles [rad] and openings [m] (2 n + 2,) float32."""
         return self._controller.measured(self.data).astype(np.float32)
 
     def environment_state(self) -> np.ndarray:
-        """Everything but the robot, as named by `ENVIRONMENT_STATE_NAMES` (n,) float32."""
+        """Return the state of all objects (n,) float32; see `ENVIRONMENT_STATE_NAMES`."""
         place = self.model.body_pos[self._knob_body].tolist()
         liquids = self.liquids
         amounts = [*liquids.amounts.values(), *liquids.cup.values(), liquids.tea, liquids.mixed]
@@ -161,7 +165,7 @@ class Simulation:
         return np.concatenate([self.data.qpos[self._poses], rest]).astype(np.float32)
 
     def paint(self) -> None:
-        """Bring what can be seen up to date: levels, colours, limbs, and the glow of the hob."""
+        """Update what pictures show: levels, puddles, limbs, and the glow of the hob."""
         self.liquids.paint(self.model, self.data)
         self._paint_body(self.data)
         plate, pilot = self._glow

@@ -1,4 +1,4 @@
-"""What has to be kept so that a running station can be continued from where it was."""
+"""Saved states of a running station, from which it continues with the same bits."""
 
 import copy
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import numpy as np
 from teasim.common.errors import ConfigError
 
 _KEPT = mujoco.mjtState.mjSTATE_INTEGRATION
-# Pictures and skills see the poses of the last physics step's beginning, not those of its end.
+# Pictures and skills read the poses at the beginning of the last physics step, not at its end.
 _POSES = (
     *("xpos", "xquat", "xmat", "xipos", "ximat", "geom_xpos", "geom_xmat", "site_xpos"),
     *("site_xmat", "cam_xpos", "cam_xmat", "light_xpos", "light_xdir"),
@@ -19,31 +19,31 @@ _POSES = (
 
 
 class Saved:
-    """A part of the world that can be put back to an earlier state."""
+    """A part of the station whose state can be saved and restored."""
 
     SAVED: ClassVar[tuple[str, ...]] = ()
-    """Attributes that change while the world runs."""
+    """Names of the attributes that change while the station runs."""
 
     def state(self) -> dict[str, Any]:
-        """Everything that changes, as copies by name."""
+        """Return copies of the attributes in `SAVED` by name."""
         return {name: copy.deepcopy(getattr(self, name)) for name in self.SAVED}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `state()` gave."""
+        """Restore what `state()` returned."""
         for name in self.SAVED:
             setattr(self, name, copy.deepcopy(state[name]))
 
 
 @dataclass(frozen=True)
 class PhysicsState:
-    """MuJoCo's part of a state."""
+    """State of the physics."""
 
     integration: np.ndarray
-    """MuJoCo's `mjSTATE_INTEGRATION`: time, positions, velocities, commands, warm start (n,)."""
+    """MuJoCo's `mjSTATE_INTEGRATION` (n,): time, positions, velocities, commands, warm start."""
     bodies: np.ndarray
-    """Place [m] and orientation (wxyz) of all bodies in their parents (nbody, 7): the layout."""
+    """Pose of each body in its parent (nbody, 7) [m, wxyz]; it holds the layout."""
     poses: Mapping[str, np.ndarray]
-    """What MuJoCo last derived of where things are, by its name in `MjData`."""
+    """Poses that MuJoCo derived last, by their name in `MjData`."""
 
     @classmethod
     def of(cls, model: mujoco.MjModel, data: mujoco.MjData) -> "PhysicsState":
@@ -75,15 +75,15 @@ class PhysicsState:
 
 @dataclass(frozen=True)
 class SimulationState:
-    """A running station between two control steps; it can be pickled."""
+    """State of a station between two control steps; it can be pickled."""
 
     physics: PhysicsState
-    """MuJoCo's part."""
+    """State of the physics."""
     target: np.ndarray
-    """Last target of the control: joint angles [rad], openings [m] (16,)."""
+    """Last target: joint angles [rad] and openings [m] (2 n + 2,)."""
     controller: Mapping[str, Any]
     """State of the motor control."""
     liquids: Mapping[str, Any]
-    """Levels, spills and streams."""
+    """State of `Liquids`: amounts, spills and streams."""
     recogniser: Mapping[str, Any]
-    """What happened so far."""
+    """State of the event recogniser."""

@@ -1,4 +1,4 @@
-"""Composition of the tea-making station: where things stand and how far they may be moved."""
+"""Model of the tea-making station: nominal places of the objects and ranges of random layouts."""
 
 import copy
 from collections.abc import Mapping
@@ -10,28 +10,28 @@ import mujoco
 import numpy as np
 
 from teasim.constants import PHYSICS_TIMESTEP, assets_folder
-from teasim.world.embodiments import find_embodiment
+from teasim.world.bodies.embodiments import find_embodiment
 from teasim.world.grain import add_grain
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Pose of an upright thing on the table."""
+    """Pose of an upright object on the table."""
 
     x: float
-    """Position towards the front of the robot [m]."""
+    """Position along x, to the front of the robot [m]."""
     y: float
-    """Position towards the robot's left [m]."""
+    """Position along y, to the robot's left [m]."""
     z: float = 0.0
     """Height of its underside [m]; the table top is 0."""
     yaw: float = 0.0
-    """Turn about the vertical [rad]."""
+    """Rotation about the vertical [rad]."""
     tilt: float = 0.0
-    """Lean about its own y axis after the turn [rad]."""
+    """Rotation about its own y axis after the yaw [rad]."""
 
     @property
     def quaternion(self) -> np.ndarray:
-        """Orientation (4,), wxyz."""
+        """Orientation as a quaternion (4,), wxyz."""
         turn, lean = self.yaw / 2, self.tilt / 2
         return np.array(
             [
@@ -44,7 +44,7 @@ class Placement:
 
 
 HOB_HEIGHT = 0.04
-"""Height of the hob's top, where kettle and knob stand [m]."""
+"""Height of the hob's top, on which kettle and knob stand [m]."""
 
 NOMINAL: Mapping[str, Placement] = MappingProxyType(
     {
@@ -57,29 +57,29 @@ NOMINAL: Mapping[str, Placement] = MappingProxyType(
         "spoon_holder": Placement(0.54, 0.18),
     }
 )
-"""Layout the skills were designed for; the tea bag and the spoon stand in their holders."""
+"""Nominal layout; the tea bag and the spoon stand in their holders."""
 
 POSITION_RANGE = 0.03
-"""Things are moved at most this far from their nominal place, in x and in y [m]."""
+"""Largest random shift of an object along x and along y [m]."""
 YAW_RANGE = np.radians(10)
-"""Things are turned at most this far from their nominal yaw [rad]."""
+"""Largest random change of an object's yaw [rad]."""
 KNOB_RANGE = 0.015
-"""The knob is moved at most this far, and never turned [m]."""
+"""Largest random shift of the knob along x and along y [m]; its yaw is fixed."""
 VESSEL_GAP = 0.18
-"""Sugar pot and milk jug stand at least this far apart, for the hand at the jug's handle [m]."""
+"""Smallest distance along y between sugar pot and milk jug [m]; the hand at the jug fits in."""
 
 IN_HOLDER = {"tea_bag": ("tea_bag_holder", 0.001, 0.0), "spoon": ("spoon_holder", 0.002, 0.15)}
-"""What stands in which holder: holder, height [m], lean [rad]."""
+"""Holder of each object that stands in one, its height [m] and its tilt [rad]."""
 
 FREE_BODIES = ("kettle", "cup", "milk_jug", "sugar_pot", "tea_bag", "spoon")
-"""Everything that can be carried away."""
+"""Objects that can be carried."""
 
 _FIXED_BODIES = ("knob", "tea_bag_holder", "spoon_holder")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything stands at the start of an episode."""
+    """Poses of all objects at the start of an episode."""
 
     placements: Mapping[str, Placement]
     """One placement per name in `NOMINAL`."""
@@ -88,7 +88,7 @@ class Layout:
         object.__setattr__(self, "placements", MappingProxyType(dict(self.placements)))
 
     def __getitem__(self, name: str) -> Placement:
-        """Placement of a free body or of a holder."""
+        """Return the placement of a free body, a holder or the knob."""
         if name in IN_HOLDER:
             holder, height, lean = IN_HOLDER[name]
             at = self.placements[holder]
@@ -97,12 +97,12 @@ class Layout:
 
 
 def nominal_layout() -> Layout:
-    """Everything in its nominal place."""
+    """Return the layout with every object in its nominal place."""
     return Layout(NOMINAL)
 
 
 def sample_layout(rng: np.random.Generator) -> Layout:
-    """Everything moved and turned uniformly within the stated ranges, hands fitting between."""
+    """Draw a layout uniformly from the ranges above; one without `VESSEL_GAP` is redrawn."""
     while True:
         placements = {name: _moved(name, at, rng) for name, at in NOMINAL.items()}
         if placements["sugar_pot"].y - placements["milk_jug"].y >= VESSEL_GAP:
@@ -110,7 +110,7 @@ def sample_layout(rng: np.random.Generator) -> Layout:
 
 
 def draw_layout(rng: np.random.Generator, *, randomize: bool) -> Layout:
-    """A random layout, or the nominal one, for which nothing is drawn."""
+    """Return a random layout, or the nominal one, for which `rng` is not used."""
     return sample_layout(rng) if randomize else nominal_layout()
 
 
@@ -121,7 +121,7 @@ def _moved(name: str, at: Placement, rng: np.random.Generator) -> Placement:
 
 
 def station_spec(embodiment: str = "yumi") -> mujoco.MjSpec:
-    """Station with somebody to work at it and props at their nominal places.
+    """Return the station with an embodiment and all objects in their nominal places.
 
     Raises:
         ConfigError: there is no such embodiment.
@@ -150,7 +150,7 @@ def _compiled(embodiment: str) -> mujoco.MjModel:
 
 
 def station_model(embodiment: str = "yumi") -> mujoco.MjModel:
-    """Compiled station; every caller gets a copy of its own, since layouts are written into it.
+    """Return a new copy of the compiled station; layouts are written into it.
 
     Raises:
         ConfigError: there is no such embodiment.
@@ -159,12 +159,12 @@ def station_model(embodiment: str = "yumi") -> mujoco.MjModel:
 
 
 def body_name(name: str) -> str:
-    """Name in the model of a station body: props carry their own name as a prefix."""
+    """Return the name of an object's body in the model; props have their own name as a prefix."""
     return name if name == "knob" else f"{name}/{name}"
 
 
 def place(model: mujoco.MjModel, data: mujoco.MjData, layout: Layout) -> None:
-    """Write a layout into the free joints and the fixed bodies."""
+    """Write a layout into the free joints and into the poses of the fixed bodies."""
     for name in _FIXED_BODIES:
         body = model.body(body_name(name))
         at = layout[name]

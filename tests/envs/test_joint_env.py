@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from teasim.constants import GRIPPER_OPEN, GRIPPER_SQUEEZE, STATE_NAMES
 from teasim.envs.actions import DELTA_SHARE
 from teasim.envs.joint_env import TeaMakingEnv
-from teasim.world.yumi import JOINT_SPEEDS
+from teasim.world.bodies.yumi import JOINT_SPEEDS
 
 ENV = TeaMakingEnv()
 DELTA = TeaMakingEnv(control="delta")

@@ -9,7 +9,8 @@ from filtering.output import FILES, write_filter_output
 from filtering.report import DemoView, Mark, ReportSection, Segment, render_report
 from filtering.report.layout import place_dots, place_marks
 from teasim.common.errors import ConfigError
-from teasim.pool import Pool
+from teasim.pool import Pool, Span
+from teasim.pool.segments_table import read_segments_table
 from teasim.pool.weight_table import read_weight_table
 
 
@@ -119,3 +120,11 @@ def test_marks_that_are_close_stand_on_different_lines() -> None:
     assert [item.mark.text for item in placed] == ["c", "b", "a"]
     assert [item.level for item in placed] == [0, 0, 1]
     assert [item.turned for item in placed] == [True, False, False]
+
+
+def test_segments_read_back(written: Path, toy_filter: DemoFilter) -> None:
+    rows = read_segments_table(written / "segments.csv")
+    own: dict[int, list[Span]] = {}
+    for row in rows:
+        own.setdefault(row.episode_index, []).append(row.span)
+    assert [tuple(own[index]) for index in sorted(own)] == list(toy_filter.segments_.spans)

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-import teasim.generation
 from teasim.cli import generate as verb
 from teasim.cli.main import main
 from teasim.common.errors import ConfigError
-from teasim.generation import DemoPlan, GenerateConfig, generate, plan_pool
+from teasim.generation import DemoPlan, GenerateConfig, Generated, generate, making, plan_pool
 from teasim.generation.presets import PRESETS, find_preset
 from teasim.pool.integrity import check_pool
 from teasim.skills.demonstrators import PARTICIPANTS
@@ -40,7 +39,7 @@ def test_people_have_orders_of_their_own_among_the_legal_ones():
 def films(tmp_path_factory):
     """One short film of a person, in the fixed look and in a random one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(teasim.generation, "plan_pool", lambda _: (SHORT,))
+        patch.setattr(making, "plan_pool", lambda _: (SHORT,))
         root = tmp_path_factory.mktemp("people")
         return {
             look: generate(
@@ -86,12 +85,15 @@ def test_a_preset_makes_its_pools_in_folders_of_their_own(name, tmp_path, monkey
     def fake(folder, config, **_):
         made[folder] = config
         pool = type("Pool", (), {"episodes": range(sum(config.counts.values()))})
-        return teasim.generation.Generated(pool, 1)
+        return Generated(pool, 1)
 
-    monkeypatch.setattr(teasim.generation, "generate", fake)
-    assert verb.main([str(tmp_path), "--preset", name, "--seed", "7", "--size", "64"]) == 0
+    monkeypatch.setattr(making, "generate", fake)
+    ignored = ["--seq1", "0", "--seq2", "-1", "--participants", "9"]
+    options = ["--preset", name, "--seed", "7", "--size", "64", *ignored]
+    assert verb.main([str(tmp_path), *options]) == 0
     assert {path.name for path in made} == set(PRESETS[name])
     assert {(config.seed, config.size) for config in made.values()} == {(7, 64)}
+    assert all(config.team and config.seq1 for config in made.values())
     count = sum(sum(config.counts.values()) for config in made.values())
     assert capsys.readouterr().out.startswith(f"{count} demonstrations in {tmp_path} (")
 
@@ -102,10 +104,10 @@ def test_a_preset_makes_its_pools_in_folders_of_their_own(name, tmp_path, monkey
         (["--preset", "poem"], "Unknown preset 'poem'; choose paper."),
         (["--embodiment", "cat"], "Unknown embodiment 'cat'; choose yumi, person."),
         (["--look", "odd"], "Unknown look 'odd'; choose fixed, random."),
-        (["--participants", "4"], "4 participants are asked for; choose 1 to 3."),
+        (["--participants", "4"], "The number of participants is 4; choose 1 to 3."),
         (
             ["--optional", "stir"],
-            "'stir' is no optional ingredient; choose add_sugar, add_milk.",
+            "'stir' is not optional; choose add_sugar, add_milk.",
         ),
     ],
 )

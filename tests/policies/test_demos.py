@@ -10,6 +10,7 @@ from teasim.common.errors import ConfigError, PoolError
 from teasim.common.workers import Workers
 from teasim.constants import STATE_NAMES, SUBTASKS
 from tests.policies.fakes import FLAGS
+from tests.toy_pool import SEQ_1, make_toy_pool
 
 
 def test_decisions_of_a_pool(decisions):
@@ -90,6 +91,20 @@ def test_the_state_alone_needs_no_frame(fake_pool):
     assert samples.maps.shape == (48, 1, 0, 0, 1, 1)
     np.testing.assert_array_equal(samples.low_dim[3, -7:], [1, 0, 1, 0, 1, 0, 0])
     assert np.abs(samples.low_dim[:, :-7]).max() < 1e-3
+
+
+def test_a_pool_without_cameras_gives_its_state(tmp_path):
+    pool = make_toy_pool(tmp_path / "pool", [SEQ_1], cameras=())
+    samples = load_decisions(pool)
+    assert samples.spec.cameras == ()
+    assert samples.low_dim.shape == (7, len(STATE_NAMES) + len(SUBTASKS))
+    with pytest.raises(ConfigError) as error:
+        load_decisions(pool, DemosConfig(observe="pixels"))
+    assert str(error.value) == (
+        f"'{pool.root}' has no camera; choose observe auto or state instead."
+    )
+    with pytest.raises(ConfigError, match=r"has no camera 'cup'; choose none\.$"):
+        load_decisions(pool, DemosConfig(cameras=("cup",)))
 
 
 def test_a_state_that_was_not_logged_is_named(human_pool, fake_pool, monkeypatch):

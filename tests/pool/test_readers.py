@@ -449,3 +449,39 @@ def test_the_line_for_videos_copies_what_is_kept(inputs: dict[str, Path]) -> Non
         "Videos:    grep -v '^#' keep.txt | rsync -a --files-from=- "
         f"{shlex.quote(f'{flat.root}/')} {shlex.quote(f'{flat.root}_keep/')}"
     )
+
+
+# logs
+
+
+@pytest.mark.parametrize("name", made.ALL)
+def test_logs_of_every_source(inputs: dict[str, Path], name: str) -> None:
+    source = open_source(inputs[name])
+    expected = {
+        "robomimic": {"action": 0, "observation.eef_pos": 50},
+        "minari": {"action": 50, "observation.agent_pos": 0},
+        "aloha": {"action": 0, "observation.state": 50},
+    }.get(name.partition("_")[0], {})
+    assert set(source.logs) == set(expected)
+    for number, demo in enumerate(source.episodes):
+        for log, first in expected.items():
+            values = pickle.loads(pickle.dumps(demo)).log(log)
+            assert values.dtype == np.float32
+            assert values.shape == (demo.length, len(source.logs[log])) == (demo.length, 3)
+            short = name.startswith("minari") and log == "action"  # the last is repeated
+            stored = made.log(number + first, demo.length - short)
+            np.testing.assert_array_equal(values[: len(stored)], stored)
+            assert (values[-1] == stored[-1]).all()
+        with pytest.raises(PoolError, match=r"has no log(s of numbers, so it has no)? 'nothing'"):
+            demo.log("nothing")
+
+
+def test_a_number_that_is_not_finite_is_told(inputs: dict[str, Path], tmp_path: Path) -> None:
+    path = copy(inputs, "robomimic", tmp_path / "copy")
+    with h5py.File(path, "a") as file:
+        file["data/demo_1/actions"][2] = np.nan
+    with pytest.raises(PoolError) as caught:
+        open_source(path).episodes[1].log("action")
+    assert str(caught.value) == (
+        f"'/data/demo_1/actions' of '{path}' is not a finite number at frame 2."
+    )

@@ -71,7 +71,10 @@ def test_overlapping_spans_are_refused() -> None:
         ({"fps": 0}, "fps is 0; a pool needs a whole number of 1 or more."),
         ({"height": 63}, "The frame height is 63; choose an even number of pixels."),
         ({"width": 0}, "The frame width is 0; choose an even number of pixels."),
-        ({"cameras": ()}, "The header names no camera; a pool needs one or more."),
+        (
+            {"cameras": (), "state_names": None},
+            "The header names neither a camera nor a joint log; a pool needs one.",
+        ),
         (
             {"cameras": ("a/b",)},
             "'a/b' is no camera name; use letters, digits, hyphen and underscore.",

@@ -12,9 +12,9 @@ from teasim.skills.geometry import DOWN, pose, position, rotation, tool, turn_an
 from teasim.skills.ik import kinematics
 from teasim.skills.style import Style
 from teasim.task.subtasks import ROWS
-from teasim.world.embodiments import EMBODIMENTS, PERSON
+from teasim.world.bodies.embodiments import EMBODIMENTS, PERSON
+from teasim.world.bodies.person import HAND_RANGE, HANDS_READY
 from teasim.world.monitor import Monitor
-from teasim.world.person import HAND_RANGE, HANDS_READY
 from teasim.world.simulation import Simulation
 from teasim.world.station import nominal_layout
 

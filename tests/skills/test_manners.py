@@ -7,7 +7,7 @@ from teasim.skills.library import SKILLS, perform
 from teasim.skills.style import Style
 from teasim.task.mistakes import ABANDONED, INEFFECTIVE, MISSING_THE_CUP
 from teasim.task.scoring import spills
-from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.bodies.embodiments import EMBODIMENTS
 from teasim.world.monitor import PENETRATION_LIMIT, Monitor
 from tests.skills.test_skills import home, poses, prepare, station
 

@@ -26,9 +26,9 @@ from teasim.skills.geometry import (
 from teasim.skills.ik import ANGLE_TOLERANCE, POSITION_TOLERANCE, kinematics
 from teasim.skills.pour import KETTLE, MILK_JUG, SUGAR_POT, spout_offset
 from teasim.skills.style import Style
+from teasim.world.bodies.yumi import JOINT_SPEEDS, READY, SOFT_LIMITS
 from teasim.world.simulation import Simulation
 from teasim.world.station import nominal_layout
-from teasim.world.yumi import JOINT_SPEEDS, READY, SOFT_LIMITS
 
 NUMBERS = st.floats(-1, 1)
 VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array)

@@ -9,7 +9,7 @@ from teasim.skills.pace import STRETCH, TYPICAL_SECONDS, Pace, idle
 from teasim.skills.style import Style
 from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1
-from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.bodies.embodiments import EMBODIMENTS
 from teasim.world.monitor import TCP_SPEED_LIMIT, Monitor
 from teasim.world.simulation import Simulation
 from teasim.world.station import nominal_layout

@@ -11,12 +11,12 @@ from teasim.rollout import run_subtask
 from teasim.skills.demonstrators import sample_style, varied
 from teasim.skills.library import SKILLS, perform
 from teasim.skills.style import Style
-from teasim.world.embodiments import EMBODIMENTS, Embodiment
+from teasim.world.bodies.embodiments import EMBODIMENTS, Embodiment
+from teasim.world.bodies.yumi import READY
 from teasim.world.liquids import VESSELS
 from teasim.world.monitor import PENETRATION_LIMIT, TCP_SPEED_LIMIT, Monitor
 from teasim.world.simulation import Simulation
 from teasim.world.station import FREE_BODIES, body_name, nominal_layout, sample_layout
-from teasim.world.yumi import READY
 
 LAYOUTS = (0, 1)
 HOME = np.concatenate([READY[arm] for arm in ARMS])

@@ -13,7 +13,7 @@ from teasim.constants import ARMS, SUBTASKS
 from teasim.skills.library import SKILLS
 from teasim.task.recipes import CRITICAL, OPTIONAL, POURED, SEQ_1, SEQ_2
 from teasim.task.subtasks import REGISTRY, ROWS, Subtask, Turned, find_subtask
-from teasim.world.embodiments import EMBODIMENTS
+from teasim.world.bodies.embodiments import EMBODIMENTS
 from teasim.world.events import WATCHERS
 from teasim.world.segments import SEGMENT_NAMES, segments
 from teasim.world.station import station_model

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from teasim.constants import ARMS, CONTROL_TIMESTEP, GRIPPER_OPEN, GRIPPER_SQUEEZE, STATE_NAMES
+from teasim.world.bodies.yumi import FINGER_SPEED, READY
 from teasim.world.control import Controller
 from teasim.world.monitor import PENETRATION_LIMIT
 from teasim.world.station import station_model
-from teasim.world.yumi import FINGER_SPEED, READY
 
 UPDATES = 5
 CENTRES = (np.arange(UPDATES) + 0.5) / UPDATES  # when within a step the updates aim

@@ -7,15 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from teasim.world.liquids import (
+    CONTENTS,
     CUP_RADIUS,
     FLOW_LIMIT,
+    LOBES,
     RIM_HEIGHT,
     VESSELS,
     Liquids,
     held_volume,
+    puddle_shape,
 )
 from teasim.world.simulation import Simulation
-from teasim.world.station import body_name, nominal_layout, place, station_model
+from teasim.world.station import HOB_HEIGHT, body_name, nominal_layout, place, station_model
 
 DT = 0.02
 RIGHT_ANGLE = np.pi / 2
@@ -192,6 +195,40 @@ def test_levels_can_be_seen(table):
     assert (cup.rgba[3], kettle.rgba[3]) == (1, 0)
     assert model.geom("spill_water_0").rgba[3] > 0
     assert model.geom("spill_milk_0").rgba[3] == 0
+
+
+HOB = (0.43, -0.32)  # its middle, and 14 x 15 cm from there to its edges
+HALF = (0.14, 0.15)
+
+
+@pytest.mark.parametrize("content", CONTENTS)
+@pytest.mark.parametrize(
+    ("at", "height"),
+    [
+        (HOB, HOB_HEIGHT),
+        ((0.55, -0.20), HOB_HEIGHT),  # near a corner
+        ((0.30, -0.46), HOB_HEIGHT),
+        ((0.42, 0.10), 0.0),
+        ((0.43, -0.10), 0.0),
+    ],
+)
+def test_a_puddle_lies_where_the_liquid_lands(table, content, at, height):
+    table.liquids.spilled[content], table.liquids.puddles[content] = 20.0, np.array(at)
+    table.liquids.paint(table.model, table.data)
+    lobes = [table.model.geom(puddle_shape(content, k)) for k in range(len(LOBES))]
+    assert lobes[0].pos[2] == pytest.approx(height)
+    for lobe in lobes:
+        beyond = np.abs(lobe.pos[:2] - HOB) - HALF
+        assert lobe.pos[2] == pytest.approx(HOB_HEIGHT if (beyond <= 0).all() else 0.0)
+        if lobe.pos[2]:  # nothing hangs over an edge
+            assert (beyond + lobe.size[:2] <= 1e-9).all()
+
+
+def test_a_stream_ends_on_the_hob(table):
+    table.tilt("kettle", np.radians(100), np.array([*HOB, 0.3]))
+    table.flow(0.2)
+    (stream,) = table.liquids.streams
+    assert stream.end == pytest.approx([*HOB, HOB_HEIGHT])
 
 
 def test_a_picture_shows_the_level_of_now_and_not_of_the_last_step():

@@ -7,7 +7,7 @@ import pytest
 
 from teasim.render import StationRenderer
 from teasim.world.liquids import Stream
-from teasim.world.looks import Cloth, Distractor, Look, sample_look
+from teasim.world.looks.look import Cloth, Distractor, Look, sample_look
 from teasim.world.segments import SEGMENT_NAMES, segments
 from teasim.world.station import sample_layout
 

@@ -13,6 +13,7 @@ from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip
 from teasim.pool.lerobot import layout
 from teasim.pool.lerobot.columns import as_numpy, numbers, read_column, whole_numbers
+from teasim.pool.lerobot.describing.features import NOT_NUMBERS, is_log
 from teasim.pool.lerobot.describing.metadata import Metadata
 from teasim.pool.lerobot.identity import demo_id, halves, identifying_log
 from teasim.pool.lerobot.images import image_clip
@@ -21,9 +22,6 @@ from teasim.pool.lerobot.labels import annotated_spans, said, said_spans
 from teasim.pool.lerobot.log import Rows, rows_of
 from teasim.pool.source import Clip
 from teasim.pool.types import NO_SUBTASK, GroundTruth, MistakeSpan, Span, spans_from_index
-
-NOT_NUMBERS = ("video", "image", "string", "language")
-"""Kinds of features that are no numbers."""
 
 
 class Episode:
@@ -244,6 +242,18 @@ class Episode:
                 f"'{self.data_path}' of demonstration {self.index}."
             )
         return values
+
+    def log(self, name: str) -> np.ndarray:
+        """A log of numbers, (n, D) float32.
+
+        Raises:
+            PoolError: There is no such log, or it is damaged (see `column`).
+        """
+        features = self._meta.features
+        if name not in features or not is_log(name, features[name]):
+            known = ", ".join(key for key, spec in features.items() if is_log(key, spec)) or "none"
+            raise PoolError(f"'{self.name}' has no log '{name}'; it has {known}.")
+        return self.column(name).reshape(self.length, -1).astype(np.float32)
 
     def clip(self, camera: str) -> Clip:
         """The demonstration's frames by `camera` (short name).

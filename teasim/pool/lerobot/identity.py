@@ -7,7 +7,8 @@ but not pictures), re-labelling, and the loss of every feature that it is not ma
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -49,6 +50,27 @@ def halves(identity: str) -> tuple[str, ...]:
         return ()
     middle = len(ID_PREFIX) + HALF
     return identity[:middle], identity[middle:]
+
+
+def matched(known: Sequence[str], asked: Sequence[str]) -> list[str | None]:
+    """Return which of the `known` identities each of the `asked` ones is; None where none is.
+
+    A whole identity fits first. Where other tools have removed features or encoded the videos
+    anew, one half is enough, if it tells the demonstration from all others on both sides.
+    """
+    whole = set(known)
+    told = Counter(half for identity in known for half in halves(identity))
+    wanted = Counter(half for identity in asked for half in halves(identity))
+    by_half = {half: identity for identity in known for half in halves(identity)}
+    by_half = {half: identity for half, identity in by_half.items() if told[half] == 1}
+
+    def found(identity: str) -> str | None:
+        if identity in whole:
+            return identity
+        fits = [by_half[h] for h in halves(identity) if h in by_half and wanted[h] == 1]
+        return fits[0] if fits else None
+
+    return [found(identity) for identity in asked]
 
 
 def _hash_of(values: np.ndarray) -> str:

@@ -7,7 +7,7 @@ from teasim.pool.types import PoolHeader
 
 CODEBASE_VERSION = "v3.0"
 CHUNK_SIZE = 1000
-"""Files per folder, LeRobot's default."""
+"""Demonstrations per folder, LeRobot's default `chunks_size`."""
 
 INFO = Path("meta/info.json")
 STATS = Path("meta/stats.json")
@@ -63,47 +63,52 @@ def features_of(header: PoolHeader) -> dict[str, dict[str, Any]]:
     """The `features` of info.json: logs that were not made are absent, not zero."""
     features: dict[str, dict[str, Any]] = {}
     if header.state_names is not None:
-        features[STATE] = _vector(header.state_names)
-        features[ACTION] = _vector(header.state_names)
+        features[STATE] = vector(header.state_names)
+        features[ACTION] = vector(header.state_names)
     if header.environment_state_names is not None:
-        features[ENVIRONMENT_STATE] = _vector(header.environment_state_names)
+        features[ENVIRONMENT_STATE] = vector(header.environment_state_names)
     for camera in header.cameras:
-        features[CAMERA_PREFIX + camera] = _video(header)
+        features[CAMERA_PREFIX + camera] = video(
+            height=header.height, width=header.width, fps=header.fps
+        )
     features |= {
-        SUBTASK_INDEX: _scalar("int64"),
-        "next.reward": _scalar("float32"),
-        "next.success": _scalar("bool"),
-        "next.done": _scalar("bool"),
-        "timestamp": _scalar("float32"),
-        "frame_index": _scalar("int64"),
-        "episode_index": _scalar("int64"),
-        "index": _scalar("int64"),
-        "task_index": _scalar("int64"),
+        SUBTASK_INDEX: scalar("int64"),
+        "next.reward": scalar("float32"),
+        "next.success": scalar("bool"),
+        "next.done": scalar("bool"),
+        "timestamp": scalar("float32"),
+        "frame_index": scalar("int64"),
+        "episode_index": scalar("int64"),
+        "index": scalar("int64"),
+        "task_index": scalar("int64"),
     }
     return features
 
 
-def _vector(names: tuple[str, ...]) -> dict[str, Any]:
+def vector(names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the feature of a log with these names of dimensions."""
     return {"dtype": "float32", "shape": [len(names)], "names": list(names)}
 
 
-def _scalar(dtype: str) -> dict[str, Any]:
+def scalar(dtype: str) -> dict[str, Any]:
+    """Return the feature of a column with one value per frame."""
     return {"dtype": dtype, "shape": [1], "names": None}
 
 
-def _video(header: PoolHeader) -> dict[str, Any]:
+def video(*, height: int, width: int, fps: int) -> dict[str, Any]:
+    """Return the feature of a camera whose videos are h264."""
     return {
         "dtype": "video",
-        "shape": [header.height, header.width, 3],
+        "shape": [height, width, 3],
         "names": ["height", "width", "channels"],
         "info": {
-            "video.height": header.height,
-            "video.width": header.width,
+            "video.height": height,
+            "video.width": width,
             "video.codec": "h264",
             "video.pix_fmt": "yuv420p",
             "video.is_depth_map": False,
             "is_depth_map": False,
-            "video.fps": header.fps,
+            "video.fps": fps,
             "video.channels": 3,
             "has_audio": False,
         },

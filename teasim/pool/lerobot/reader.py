@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from teasim.pool.hub import located
 from teasim.pool.lerobot import layout
+from teasim.pool.lerobot.describing.features import dimension_names, is_log
 from teasim.pool.lerobot.describing.metadata import Metadata, read_metadata
 from teasim.pool.lerobot.episode import Episode
 from teasim.pool.lerobot.labelling import Labelling
@@ -81,15 +82,16 @@ class Pool:
     @property
     def state_names(self) -> tuple[str, ...] | None:
         """Names of the dimensions of observation.state; None without a joint log."""
-        feature = self._meta.features.get(layout.STATE)
-        if feature is None:
-            return None
-        names = feature.get("names")
-        if isinstance(names, Mapping):  # some recorders write {"motors": [...]}
-            names = next(iter(names.values()), None)
-        width = int(feature["shape"][0]) if feature["shape"] else 1
-        named = isinstance(names, list) and len(names) == width
-        return tuple(map(str, names)) if named else tuple(f"state_{i}" for i in range(width))
+        return self.logs.get(layout.STATE)
+
+    @cached_property
+    def logs(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the dimensions of each log of numbers."""
+        return {
+            name: dimension_names(name, feature)
+            for name, feature in self._meta.features.items()
+            if is_log(name, feature)
+        }
 
     @property
     def has_predictions(self) -> bool:

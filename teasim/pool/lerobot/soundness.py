@@ -17,9 +17,10 @@ from teasim.common.errors import PoolError
 from teasim.common.files import sha256_of
 from teasim.pool.clips import probe
 from teasim.pool.lerobot.columns import as_numpy, read_columns
+from teasim.pool.lerobot.describing.features import NOT_NUMBERS
 from teasim.pool.lerobot.describing.metadata import Metadata, metadata_notes
 from teasim.pool.lerobot.describing.places import inside
-from teasim.pool.lerobot.episode import NOT_NUMBERS, Episode
+from teasim.pool.lerobot.episode import Episode
 from teasim.pool.lerobot.log import TIME_TOLERANCE
 
 FRAME = 0.9

@@ -6,6 +6,7 @@ from pathlib import Path
 from teasim.common.errors import PoolError
 from teasim.pool.clips.hdf5 import opened
 from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash, root_names
+from teasim.pool.hdf5_logs import logs_of
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.readers.videos import natural
 from teasim.pool.recordings import RecordedSource, Recording, unreadable
@@ -62,7 +63,17 @@ def _recording(index: int, path: Path) -> Recording:
             )
         logs = {key: data for key, data in arrays(file) if not key.startswith("observations/im")}
         content = logs_hash(path, logs)
-    return Recording(index, path.stem, lengths.pop(), clips, path.name, content)
+        length = lengths.pop()
+        named = {_log_name(key): data for key, data in logs.items()}
+        stored = logs_of(path, named, length)
+    return Recording(index, path.stem, length, clips, path.name, content, logs=stored)
+
+
+def _log_name(key: str) -> str:
+    """Return LeRobot's name of an array: qpos is the state."""
+    return {"action": "action", "observations/qpos": "observation.state"}.get(
+        key, f"observation.{key.removeprefix('observations/').replace('/', '.')}"
+    )
 
 
 def _usage(root: Path, entries: Sequence[str], keep: bool) -> list[str]:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from teasim.common.errors import ConfigError
+from teasim.pool.hub import copy_of
 from teasim.pool.integrity import check_pool
 from teasim.pool.lerobot import Pool, layout
 from teasim.pool.readers.reader import Reader, ReadOptions
@@ -14,15 +14,13 @@ def recognises(path: Path) -> bool:
 
 
 def open_pool(path: Path, options: ReadOptions) -> Pool:
-    """Open the data set.
+    """Open the data set, which stores all that the options could tell.
 
     Raises:
-        ConfigError: a frame rate was given, which the data set stores itself.
         PoolError: it is damaged.
     """
-    if options.fps is not None:
-        raise ConfigError(f"The pool '{path}' stores its own frame rate; leave out fps.")
+    del options  # none is looked at
     return Pool.open(path)
 
 
-READER = Reader("LeRobot data set", recognises, open_pool, check_pool)
+READER = Reader("LeRobot data set", recognises, open_pool, check_pool, options=(), find=copy_of)

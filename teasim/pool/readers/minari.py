@@ -7,12 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from teasim.common.errors import PoolError
+from teasim.common.errors import ConfigError, PoolError
 from teasim.pool.clips.hdf5 import opened
 from teasim.pool.hdf5 import arrays, clips_in, group, logs_hash
+from teasim.pool.hdf5_facts import read_facts
+from teasim.pool.hdf5_logs import StoredLog, logs_of, observation_logs
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.recordings import RecordedSource, Recording, unreadable
 
+RATE = "teasim_fps"
+"""Entry of metadata.json of data sets that teasim writes; Minari stores no frame rate."""
 MAIN, METADATA = "main_data.hdf5", "metadata.json"
 EPISODE = re.compile(r"episode_(\d{1,9})")
 NAME = re.compile(r"([\w\-.]+/)*[\w\-.]+-v\d+")
@@ -64,9 +68,13 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
             f"'{place}' has no pictures that all episodes have, only "
             f"{', '.join(_low_dimensional(place, names[0]))}; record them in the observations."
         )
+    stored = _stored_rate(folder)
+    if stored is not None and options.fps is not None:
+        raise ConfigError(f"'{path}' stores its own frame rate, {stored:g}; leave out fps.")
+    fps = stored or options.fps
     notes = (
         ()
-        if options.fps
+        if fps
         else (
             f"A Minari data set does not store its frame rate; {DEFAULT_FPS:g} Hz is assumed, "
             "set --fps to change it.",
@@ -74,10 +82,11 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
     )
     return RecordedSource(
         path,
-        options.fps or DEFAULT_FPS,
+        fps or DEFAULT_FPS,
         tuple(sorted(common)),
         tuple(episodes),
         _usage,
+        tuple(dict.fromkeys(span.subtask for demo in episodes for span in demo.labels)),
         notes=notes,
     )
 
@@ -92,19 +101,52 @@ def _recording(path: Path, name: str, episode: Any) -> Recording:
         raise PoolError(f"'{path}' is damaged: the cameras of '{name}' differ in length.")
     logs = {key: data for key, data in arrays(episode) if key.startswith(("act", "obs"))}
     number = str(episode.attrs.get("id", name[8:]))
+    length = lengths.pop() if lengths else 0
+    facts = read_facts(episode, length)
     return Recording(
         index=int(name[8:]),
         name=name,
-        length=lengths.pop() if lengths else 0,
+        length=length,
         clips=clips,
         entry=number,
         content=logs_hash(path, logs),
+        labels=facts.spans if facts else (),
+        task=facts.task if facts else "",
+        record=facts.record if facts else None,
+        logs=_logs(path, episode, length),
+        identity=facts.demo_id if facts else "",
+    )
+
+
+def _logs(path: Path, episode: Any, length: int) -> dict[str, StoredLog]:
+    """Return actions, rewards and low-dimensional observations.
+
+    Minari has no action after the last observation; teasim writes the whole log into the infos.
+    """
+    infos = group(episode, "infos")
+    named = {
+        "action": infos.get("action", episode.get("actions")),
+        "next.reward": infos.get("next.reward", episode.get("rewards")),
+        "next.success": infos.get("next.success"),
+    }
+    logs = observation_logs(path, episode["observations"], length)
+    return logs | logs_of(
+        path, {name: data for name, data in named.items() if hasattr(data, "shape")}, length
     )
 
 
 def _low_dimensional(path: Path, name: str) -> list[str]:
     with opened(path) as file:
         return [key for key, _ in arrays(group(file, name))][:5]
+
+
+def _stored_rate(folder: Path) -> float | None:
+    """Return the frames per second that teasim writes into metadata.json; None without."""
+    try:
+        rate = json.loads((folder / METADATA).read_text(encoding="utf-8")).get(RATE)
+    except (OSError, ValueError, AttributeError):
+        return None
+    return float(rate) if isinstance(rate, int | float) and 0 < rate < 1e6 else None
 
 
 def _is_arrow(folder: Path) -> bool:

@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import numpy as np
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool.clips.hdf5 import library, opened
 from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash
+from teasim.pool.hdf5_facts import read_facts
+from teasim.pool.hdf5_logs import StoredLog, logs_of, observation_logs
 from teasim.pool.readers import aloha, minari
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.recordings import RecordedSource, Recording, unreadable
@@ -21,6 +24,8 @@ from teasim.pool.types import Span
 DEMO = re.compile(r"demo_(\d{1,9})")
 DEFAULT_FPS = 20.0
 """robosuite's usual control frequency [1/s], for files that do not store theirs."""
+ACTION_SCALE, ACTION_OFFSET = "action_scale", "action_offset"
+"""Entries of env_kwargs of files that teasim writes: action = stored * scale + offset."""
 
 
 def recognises(path: Path) -> bool:
@@ -100,6 +105,7 @@ def _recording(path: Path, demo: Any, clips: Mapping[str, Clip], task: str) -> R
     logs |= {} if actions is None else {"actions": actions}
     signals = group(group(demo, "datagen_info"), "subtask_term_signals")
     terms = {key: np.ravel(data[()]) for key, data in arrays(signals) if data.shape == (length,)}
+    facts = read_facts(demo, length)
     return Recording(
         index=_number(name),
         name=name,
@@ -107,9 +113,27 @@ def _recording(path: Path, demo: Any, clips: Mapping[str, Clip], task: str) -> R
         clips=clips,
         entry=name,
         content=logs_hash(path, logs),
-        labels=term_spans(terms, length),
-        task=_text(demo, "ep_meta", "lang") or task,
+        labels=facts.spans if facts else term_spans(terms, length),
+        task=_text(demo, "ep_meta", "lang") or (facts.task if facts else task),
+        record=facts.record if facts else None,
+        logs=_logs(path, demo, length),
+        identity=facts.demo_id if facts else "",
     )
+
+
+def _logs(path: Path, demo: Any, length: int) -> dict[str, StoredLog]:
+    """Return the low-dimensional observations, the actions as they were commanded, the rewards."""
+    named = {"action": demo.get("actions"), "next.reward": demo.get("rewards")}
+    logs = observation_logs(path, group(demo, "obs"), length)
+    logs |= logs_of(path, {name: data for name, data in named.items() if data is not None}, length)
+    kwargs = _json(demo.parent, "env_args").get("env_kwargs")
+    told = kwargs if isinstance(kwargs, dict) else {}
+    scale, offset = (told.get(name) for name in (ACTION_SCALE, ACTION_OFFSET))
+    if "action" in logs and isinstance(scale, list) and isinstance(offset, list):
+        if not len(scale) == len(offset) == len(logs["action"].names):
+            raise PoolError(f"'{path}' is damaged: its action_scale does not fit the actions.")
+        logs["action"] = replace(logs["action"], scale=tuple(scale), offset=tuple(offset))
+    return logs
 
 
 def _cameras(

@@ -8,12 +8,21 @@ import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from teasim.common.errors import PoolError
 from teasim.pool.clips import VideoClip, VideoInfo, probe
 from teasim.pool.readers.reader import Reader, ReadOptions
+from teasim.pool.readers.video_labels import (
+    LABELS,
+    DemoRow,
+    is_table,
+    read_demonstrations,
+    read_labels,
+)
 from teasim.pool.recordings import RecordedSource, Recording, listed, unreadable
+from teasim.pool.types import Span
 
 SUFFIXES = frozenset(
     [
@@ -59,12 +68,16 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
     infos = {file: probe(file) for files in cameras.values() for file in files.values()}
     fps = _usual_rate([info.fps for info in infos.values()])
     episodes, notes = [], []
+    known, labels = read_demonstrations(path), read_labels(path)
     for index, name in enumerate(names):
         files = {camera: cameras[camera][name] for camera in cameras}
         clips = _clips({camera: (file, infos[file]) for camera, file in files.items()}, fps)
         entry = next(iter(files.values())).name if len(cameras) == 1 else name
         length = next(iter(clips.values())).length
-        episodes.append(Recording(index, name, length, clips, entry))
+        told = known.get(name, DemoRow(name, "", ""))
+        spans = _spans(path, name, labels.get(name, ()), length)
+        demo = Recording(index, name, length, clips, entry, labels=spans, task=told.task)
+        episodes.append(replace(demo, identity=told.demo_id))
         uneven = {infos[file].n_frames for file in files.values()}
         if len(uneven) > 1 and all(_same(infos[file].fps, fps) for file in files.values()):
             notes.append(
@@ -77,8 +90,25 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
         tuple(cameras),
         tuple(episodes),
         _usage,
+        tuple(dict.fromkeys(span.subtask for demo in episodes for span in demo.labels)),
         notes=(*_notes(path, cameras, infos, fps), *notes),
     )
+
+
+def _spans(root: Path, name: str, spans: Sequence[Span], length: int) -> tuple[Span, ...]:
+    """Return the labelled sub-tasks of a video.
+
+    Raises:
+        PoolError: they overlap, or end after the video.
+    """
+    ends = [0, *(span.stop for span in spans)]
+    late = any(span.start < before for before, span in zip(ends, spans, strict=False))
+    if late or ends[-1] > length:
+        raise PoolError(
+            f"The sub-tasks of '{name}' in '{root / LABELS}' overlap or end after its {length} "
+            "frames."
+        )
+    return tuple(spans)
 
 
 def natural(name: str) -> tuple[object, ...]:
@@ -101,7 +131,7 @@ def _cameras(root: Path) -> dict[str, dict[str, Path]]:
     if flat:
         return {CAMERA: flat}
     shown = max(len(files) for files in nested.values())
-    if len(nested) > shown:
+    if len(nested) > shown and not read_demonstrations(root):
         raise PoolError(
             f"'{root}' has {len(nested)} folders of at most {shown} videos; sort them into one "
             "folder per camera, CAMERA/DEMONSTRATION.mp4."
@@ -182,7 +212,7 @@ def _notes(
         str(file.relative_to(root))
         for place in places
         for file in listed(place)
-        if file.is_file() and not is_video(file)
+        if file.is_file() and not is_video(file) and not is_table(file)
     )
     if ignored:
         notes.append(f"Files of '{root}' that are no videos are left out: {_listed(ignored)}.")

@@ -3,6 +3,7 @@
 v3.0 keeps them in parquet files, v2.0 and v2.1 in JSON lines. Both become one `EpisodeTable`.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ WHOLE = ("episode_index", "length", "dataset_from_index", "dataset_to_index")
 """Whole numbers of each demonstration, in every version."""
 PLACE = ("data/chunk_index", "data/file_index")
 """Whole numbers that tell its data file, since v3.0."""
+OWN = re.compile(r"teasim/|(?:sparse|dense)_subtask_")
+"""Entries of the JSON lines that other versions keep in columns of these names."""
 LARGEST = 2**40
 """No number, file or frame of a data set is counted higher."""
 LONGEST = 10**8
@@ -104,7 +107,7 @@ def read_json_episodes(root: Path) -> EpisodeTable:
     names = [line.get("tasks") for line in lines]
     tasks = [told if isinstance(told, list) else [told] for told in names]
     texts = [[str(task) for task in told if task is not None] for told in tasks]
-    table = pa.table({"tasks": pa.array(texts, pa.list_(pa.string()))})
+    table = pa.table({"tasks": pa.array(texts, pa.list_(pa.string())), **_own(path, lines)})
     order = np.argsort(columns["episode_index"], kind="stable")
     stops = np.empty(len(lines), dtype=np.int64)
     stops[order] = np.cumsum(columns["length"][order])
@@ -113,6 +116,15 @@ def read_json_episodes(root: Path) -> EpisodeTable:
     for name in WHOLE:
         _check_whole(root, name, columns[name])
     return _sorted(root, columns, table)
+
+
+def _own(path: Path, lines: Sequence[Mapping[str, Any]]) -> dict[str, pa.Array]:
+    """Return what other versions keep in columns: spans of sub-tasks, and teasim's facts."""
+    names = {name: None for line in lines for name in line if OWN.match(name)}
+    try:
+        return {name: pa.array([line.get(name) for line in lines]) for name in names}
+    except (pa.ArrowException, OverflowError, ValueError, TypeError) as error:
+        raise PoolError(f"The file '{path}' is damaged: a list of it is not readable.") from error
 
 
 def _places(video_keys: Sequence[str]) -> list[str]:

@@ -13,7 +13,7 @@ PIXEL_STRIDE = 2
 """Every second row and column enters the image statistics."""
 
 N_LEVELS = 256
-"""Values of a colour channel of 8 bits."""
+"""Levels of a uint8 colour channel."""
 
 Stats = dict[str, list[Any]]
 

@@ -131,9 +131,10 @@ class EpisodeWriter:
         for video in self._videos.values():
             video.close()
         fps = float(self._header.fps)
-        first = min(self._header.cameras)
-        clip = VideoClip(self._folder / f"{first}.mp4", 0.0, self._length, fps)
-        pictures = {layout.CAMERA_PREFIX + first: clip.digest()}
+        pictures = {}
+        for first in sorted(self._header.cameras)[:1]:
+            clip = VideoClip(self._folder / f"{first}.mp4", 0.0, self._length, fps)
+            pictures[layout.CAMERA_PREFIX + first] = clip.digest()
         logs = {name: np.stack(self._columns[name]) for name in _vector_columns(self._header)}
         staged = StagedEpisode(
             folder=self._folder,
@@ -149,7 +150,7 @@ class EpisodeWriter:
         if set(images) != set(self._header.cameras):
             raise PoolError(
                 f"Frame {self._length} has pictures of {', '.join(sorted(images)) or 'no camera'}; "
-                f"the pool has the cameras {', '.join(self._header.cameras)}."
+                f"the pool has the cameras {', '.join(self._header.cameras) or 'none'}."
             )
         shape = (self._header.height, self._header.width, 3)
         for camera, image in images.items():

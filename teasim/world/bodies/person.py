@@ -1,7 +1,7 @@
-"""Composition of a person: two flying hands in physics, and arms that are drawn after them.
+"""Model of a person: two hands in physics; arms, torso and head are drawn to match them.
 
-Only the hands push and hold. Forearms, upper arms and torso are shapes without contacts, put where
-a person's would be by closed-form kinematics of two links whenever a picture is taken.
+Only the hands have contacts. The poses of forearms, upper arms and torso are computed before each
+picture, by closed-form kinematics of two links.
 """
 
 from collections.abc import Mapping
@@ -11,35 +11,35 @@ import mujoco
 import numpy as np
 
 from teasim.constants import ARMS, assets_folder
-from teasim.world.yumi import set_contacts
+from teasim.world.bodies.yumi import set_contacts
 
 HAND_JOINTS = {
     arm: tuple(f"{arm}_{name}" for name in ("x", "y", "z", "roll", "pitch", "yaw")) for arm in ARMS
 }
-"""Place of the tool centre point [m], then turns about x, y, z in this order [rad], per hand."""
+"""Joints of each hand: position of the tool centre point [m], then roll, pitch, yaw [rad]."""
 
 HANDS_READY = {
     "right": np.array([0.20, -0.27, 0.10, 0.10, np.radians(-50), np.radians(-60)]),
     "left": np.array([0.20, 0.27, 0.10, -0.10, np.radians(-50), np.radians(60)]),
 }
-"""Start and rest pose of each hand (6,) [m, rad]: above the table's near edge, half palm down."""
+"""Start and park pose of each hand (6,) [m, rad], above the near edge of the table."""
 
 HAND_RANGE = np.array(
     [(-0.05, 0.66), (-0.60, 0.60), (0.01, 0.55), (-2.5, 2.5), (-1.35, 1.35), (-3.3, 3.3)]
 )
-"""Planning limits of a hand's coordinates [m, rad] (6, 2), inside the hard limits of the model."""
+"""Planning limits of a hand's joints (6, 2) [m, rad], inside the hard limits of the model."""
 
 HAND_SPEEDS = np.array([1.1, 1.1, 1.1, 8.0, 8.0, 8.0])
-"""Largest speeds of a hand's coordinates [m/s, rad/s] (6,)."""
+"""Largest speeds of a hand's joints (6,) [m/s, rad/s]."""
 
 POINTING_DOWN = {
     "right": np.diag([1.0, -1.0, -1.0]),
     "left": np.diag([-1.0, 1.0, -1.0]),
 }
-"""Orientation of the tool (3, 3) at zero turns: palms towards the person, thumbs near and inwards.
+"""Rotation matrix (3, 3) of the tool at zero roll, pitch and yaw: palms face the person.
 
-A left hand's tool is turned by half a turn, so that for both hands -y of the tool is where the
-index finger is, and one grasp on an upright handle suits either: its upper end is at the index.
+The tool of the left hand is rotated by 180 degrees about its z axis, so that -y points to the index
+finger of either hand and one grasp of an upright handle suits both.
 """
 
 UPPER_ARM = 0.31
@@ -47,25 +47,25 @@ UPPER_ARM = 0.31
 FOREARM = 0.27
 """Length from elbow to wrist [m]."""
 WRIST = np.array([0.008, 0.0, -0.125])
-"""Where the forearm begins, in the hand's frame [m]."""
+"""Position of the wrist in the hand's frame (3,) [m]."""
 SHOULDERS = {"right": np.array([-0.17, -0.19, 0.40]), "left": np.array([-0.17, 0.19, 0.40])}
-"""Places of the shoulders when the person stands upright [m]."""
+"""Positions of the shoulders of an upright person (3,) [m]."""
 HIPS = np.array([-0.47, 0.0, -0.10])
-"""Where the torso turns when the person leans over the table [m]."""
+"""Point about which the torso leans over the table (3,) [m]."""
 TORSO = 0.62
-"""How far down from the chest the torso is drawn [m]."""
+"""Length of the torso below the chest [m]."""
 HEAD = {
     "neck": np.array([0.015, 0.0, 0.08]),
     "head": np.array([0.05, 0.0, 0.19]),
     "hair": np.array([0.025, 0.0, 0.215]),
 }
-"""Middles of the parts above the chest, seen from there [m]."""
+"""Centres of the parts above the chest, relative to the chest (3,) [m]."""
 _LONGEST = 0.96 * (UPPER_ARM + FOREARM)  # the person leans forward before an arm is straight
 
 
 @dataclass(frozen=True)
 class Appearance:
-    """Colours of a person, red green blue in [0, 1]."""
+    """Colours of a person: red, green and blue, 0 to 1."""
 
     skin: tuple[float, float, float]
     """Hands and face."""
@@ -78,7 +78,7 @@ class Appearance:
 
 
 def wear(model: mujoco.MjModel, appearance: Appearance) -> None:
-    """Give the person in `model` the colours of `appearance`."""
+    """Write the colours of `appearance` into the person's materials."""
     for arm in ARMS:
         model.mat(f"{arm}_skin").rgba[:3] = appearance.skin
     for part in ("skin", "sleeve", "shirt", "hair"):
@@ -86,19 +86,19 @@ def wear(model: mujoco.MjModel, appearance: Appearance) -> None:
 
 
 def hand_spec(arm: str) -> mujoco.MjSpec:
-    """Model of one hand; what is seen of a left one is the right one's mirror image."""
+    """Return the model of one hand; the visible shapes of the left hand are mirrored."""
     spec = mujoco.MjSpec.from_file(str(assets_folder() / "person" / "hand.xml"))
     set_contacts(spec, arm)
     if arm == "left":
         for geom in spec.geoms:
             geom.pos[1] *= -1
-            geom.fromto[[1, 4]] *= -1  # stays "not a number" for shapes that have none
+            geom.fromto[[1, 4]] *= -1  # NaN, and stays NaN, for shapes without it
         spec.site("tcp").quat = (0, 0, 0, 1)
     return spec
 
 
 def mount_person(spec: mujoco.MjSpec) -> None:
-    """Put a person's body ("person_") and both hands ("right_", "left_") into the station."""
+    """Add a person's body ("person_") and both hands ("right_", "left_") to the station."""
     body = mujoco.MjSpec.from_file(str(assets_folder() / "person" / "body.xml"))
     spec.attach(body, frame=spec.worldbody.add_frame(), prefix="person_")
     for arm in ARMS:
@@ -106,7 +106,7 @@ def mount_person(spec: mujoco.MjSpec) -> None:
 
 
 class Limbs:
-    """Draws arms, torso and head after the hands."""
+    """Poses the visible arms, torso and head to match the hands."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         names = ("torso", "shoulders", *HEAD)
@@ -116,7 +116,7 @@ class Limbs:
         self._upper_arms = {arm: model.geom(f"person_{arm}_upper_arm").id for arm in ARMS}
 
     def paint(self, data: mujoco.MjData) -> None:
-        """Write where the limbs are in the world; the next physics step puts them back."""
+        """Write the poses of the limbs into `data`; the next physics step overwrites them."""
         rotations = {arm: data.xmat[hand].reshape(3, 3) for arm, hand in self._hands.items()}
         wrists = {
             arm: data.xpos[hand] + rotations[arm] @ WRIST for arm, hand in self._hands.items()
@@ -140,9 +140,10 @@ class Limbs:
 
 
 def lean_towards(wrists: Mapping[str, np.ndarray]) -> np.ndarray:
-    """How far the shoulders leave their place (3,) [m], so that no arm is too short for its wrist.
+    """Return the shift of the shoulders (3,) [m] with which both arms reach their wrists.
 
-    `wrists` holds the place (3,) [m] of each.
+    Args:
+        wrists: Position (3,) [m] of each wrist by side.
     """
     lean = np.zeros(3)
     for arm, wrist in wrists.items():
@@ -154,9 +155,16 @@ def lean_towards(wrists: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def elbow_of(arm: str, shoulder: np.ndarray, wrist: np.ndarray, pointing: np.ndarray) -> np.ndarray:
-    """Place of the elbow (3,) [m] for a shoulder and a wrist (3,) [m] of a hand `pointing` (3,).
+    """Return the position of the elbow (3,) [m].
 
-    Of all places on the circle it is where the wrist bends least, rather outside than inside.
+    Of the circle of solutions, it is the point where the wrist bends least, with a preference for
+    the outside.
+
+    Args:
+        arm: "right" or "left".
+        shoulder: Position of the shoulder (3,) [m].
+        wrist: Position of the wrist (3,) [m].
+        pointing: Direction of the hand, a unit vector (3,).
     """
     way = wrist - shoulder
     distance = float(np.clip(np.linalg.norm(way), UPPER_ARM - FOREARM, _LONGEST))
@@ -170,7 +178,7 @@ def elbow_of(arm: str, shoulder: np.ndarray, wrist: np.ndarray, pointing: np.nda
 
 
 def _lay(data: mujoco.MjData, geom: int, start: np.ndarray, end: np.ndarray) -> None:
-    """Put a shape in the middle between two places, turned the shortest way to lie along them."""
+    """Place a shape midway between two points (3,) [m], its z axis along the line between them."""
     turn = np.zeros(4)
     mujoco.mju_quatZ2Vec(turn, end - start)
     mujoco.mju_quat2Mat(data.geom_xmat[geom], turn)

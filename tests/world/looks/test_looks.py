@@ -14,9 +14,9 @@ from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
 from teasim.task.mistakes import Plan
 from teasim.task.recipes import SEQ_1
-from teasim.world import looks
-from teasim.world.dressing import apply_look
-from teasim.world.looks import (
+from teasim.world.looks import look as looks
+from teasim.world.looks.dressing import apply_look
+from teasim.world.looks.look import (
     DISTRACTORS,
     ZONES,
     CameraShift,

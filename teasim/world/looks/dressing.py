@@ -5,7 +5,7 @@ from functools import cache
 import mujoco
 import numpy as np
 
-from teasim.world.looks import CameraShift, Colour, Distractor, Light, Look, Tint
+from teasim.world.looks.look import CameraShift, Colour, Distractor, Light, Look, Tint
 from teasim.world.station import station_model
 
 _SHOWN, _HIDDEN = 2, 5  # groups of shapes; see assets/tea_station/looks.xml

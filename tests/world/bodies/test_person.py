@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from teasim.common.errors import ConfigError
 from teasim.constants import ARMS
-from teasim.world.embodiments import EMBODIMENTS, PERSON, find_embodiment
-from teasim.world.monitor import roles
-from teasim.world.person import (
+from teasim.world.bodies.embodiments import EMBODIMENTS, PERSON, find_embodiment
+from teasim.world.bodies.person import (
     FOREARM,
     SHOULDERS,
     UPPER_ARM,
@@ -18,6 +17,7 @@ from teasim.world.person import (
     elbow_of,
     lean_towards,
 )
+from teasim.world.monitor import roles
 from teasim.world.simulation import Simulation
 from teasim.world.station import FREE_BODIES, nominal_layout, station_model
 

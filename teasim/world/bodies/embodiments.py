@@ -9,7 +9,7 @@ import numpy as np
 
 from teasim.common.registry import named
 from teasim.constants import ARM_JOINTS, ARMS, GRIPPER_OPEN, GRIPPER_SQUEEZE
-from teasim.world.person import (
+from teasim.world.bodies.person import (
     HAND_JOINTS,
     HAND_RANGE,
     HAND_SPEEDS,
@@ -17,7 +17,7 @@ from teasim.world.person import (
     Limbs,
     mount_person,
 )
-from teasim.world.yumi import (
+from teasim.world.bodies.yumi import (
     FINGER_SPEED,
     JOINT_SPEEDS,
     POSTURES,

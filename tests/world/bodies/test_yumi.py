@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from teasim.constants import ARM_JOINTS, ARMS, GRIPPER_OPEN
+from teasim.world.bodies.yumi import JOINT_SPEEDS, READY, SOFT_LIMITS, planning_model
 from teasim.world.station import station_model
-from teasim.world.yumi import JOINT_SPEEDS, READY, SOFT_LIMITS, planning_model
 
 MODEL = station_model()
 MIRROR = np.diag([1.0, -1.0, 1.0])

@@ -5,7 +5,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from teasim.world.dressing import dressed_materials, is_distractor
+from teasim.world.looks.dressing import dressed_materials, is_distractor
 
 _SHAPES = ("geom_pos", "geom_size", "geom_rgba", "geom_matid", "geom_group")
 _LIGHTS = ("light_active", "light_diffuse", "light_specular", "light_dir", "light_pos")

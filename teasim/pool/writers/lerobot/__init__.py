@@ -1,0 +1,1 @@
+"""LeRobot data sets: what their versions have in common, a file per version, and verdicts."""

@@ -1,0 +1,1 @@
+"""Bodies that demonstrate at the station: YuMi and a person."""
