@@ -10,6 +10,7 @@ import tyro
 
 from teasim.common.cli import parse, resumable
 from teasim.common.errors import Interrupted
+from teasim.common.workers import WorkerOptions, Workers
 
 if TYPE_CHECKING:
     from teasim.pool.writers.content import Choice
