@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,9 +10,9 @@ import tyro
 
 from filtering.config import FilterConfig
 from filtering.segmentation.config import FitConfig
-from teasim.common import parallel
 from teasim.common.cli import parse
 from teasim.common.errors import ConfigError
+from teasim.common.workers import WorkerOptions, Workers
 from teasim.pool.readers.reader import ReadOptions
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ class FilterCommand:
     """What the format of the source does not store."""
     max_flagged: float = 1.0
     """Exit with code 1 if more than this share of the demonstrations is flagged, 0 to 1."""
-    jobs: int | None = None
-    """Number of worker processes; by default one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
     overwrite: bool = False
     """Replace the output of an earlier filter in the output folder."""
 
@@ -68,8 +68,8 @@ class FitCommand:
     """New folder for the segmenter."""
     config: Annotated[FitConfig, tyro.conf.OmitArgPrefixes]
     """Settings of the fit."""
-    jobs: int | None = None
-    """Number of worker processes; by default one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ class PredictCommand:
     """The pool, or a folder with mapping.txt and features/*.npy."""
     out: Out
     """New folder for predictions, posteriors and, where the true labels are known, metrics.json."""
-    jobs: int | None = None
-    """Number of worker processes; by default one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
 
 SegmentCommand = (
@@ -130,8 +130,10 @@ def _filter(command: FilterCommand) -> int:
     pool = open_source(command.source, command.options)
     print_notes(pool)
     check_output(command.out, pool.root, overwrite=command.overwrite)
-    fitted = DemoFilter(command.config).fit(pool, jobs=_jobs(command.jobs))
-    write_filter_output(command.out, pool, fitted, overwrite=command.overwrite)
+    fitted = DemoFilter(command.config).fit(pool, workers=command.workers)
+    write_filter_output(
+        command.out, pool, fitted, overwrite=command.overwrite, workers=command.workers
+    )
     _print_result(pool, fitted)
     page = command.out / "report.html"
     print(f"report: {page}" if page.exists() else f"weights: {command.out / 'weights.csv'}")
@@ -156,6 +158,7 @@ def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
     from filtering.demo_filter import caution
 
     print(basis(fitted))
+    print(f"cameras looked at: {', '.join(fitted.looked_at_) or 'none'}")
     confidence = fitted.segments_.confidence()
     if confidence is not None:
         found = len(fitted.segments_.subtasks)
@@ -174,8 +177,7 @@ def _fit(command: FitCommand) -> int:
     from filtering.segmentation.fit import fit_segmenter
     from filtering.segmentation.scoring import scores_table
 
-    jobs = _jobs(command.jobs)
-    result = fit_segmenter(command.pool, command.out, command.config, jobs=jobs)
+    result = fit_segmenter(command.pool, command.out, command.config, workers=command.workers)
     for name in result.never_shown:
         print(
             f"teasim: warning: no labelled demonstration shows '{name}', which others of the pool "
@@ -193,12 +195,7 @@ def _predict(command: PredictCommand) -> int:
     from filtering.segmentation.predict import predict
     from filtering.segmentation.scoring import scores_table
 
-    jobs = _jobs(command.jobs)
-    scores = predict(command.segmenter, command.source, command.out, jobs=jobs)
+    scores = predict(command.segmenter, command.source, command.out, workers=command.workers)
     print(scores_table(scores) if scores else "Nothing is scored: the true labels are not known.")
     print(f"predictions: {command.out / 'predictions'}")
     return 0
-
-
-def _jobs(jobs: int | None) -> int:
-    return parallel.default_jobs() if jobs is None else jobs

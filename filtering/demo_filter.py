@@ -27,6 +27,7 @@ from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
 from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.soundness import require_sound
 from teasim.pool.source import Source
 from teasim.pool.weight_table import WeightRow
@@ -91,6 +92,7 @@ from the whole video.
         chosen_: the settings with `auto` replaced by what it stands for in this pool.
         cameras_: cameras used for segments and states; effects use all cameras of the pool unless
             some are named.
+        looked_at_: cameras whose pictures were looked at.
         timings_: seconds per stage.
     """
 
@@ -108,18 +110,19 @@ from the whole video.
     segments_: Segmentation
     chosen_: FilterConfig
     cameras_: tuple[str, ...]
+    looked_at_: tuple[str, ...]
     timings_: dict[str, float]
 
     def __init__(self, config: FilterConfig | None = None) -> None:
         """Keep the settings; None means the defaults."""
         self.config = FilterConfig() if config is None else config
 
-    def fit(self, pool: Source, *, jobs: int = 1) -> Self:
+    def fit(self, pool: Source, *, workers: Workers = IN_PROCESS) -> Self:
         """Weigh the demonstrations of `pool`, which is not modified.
 
         Args:
             pool: what to filter.
-            jobs: number of worker processes; the result does not depend on it.
+            workers: where the work runs; the result does not depend on it.
 
         Raises:
             ConfigError: the pool has too few demonstrations, lacks a camera, or has no pictures
@@ -132,7 +135,9 @@ from the whole video.
         self.chosen_ = self.config.for_source(pool)
         self.cameras_ = self._cameras(pool)
         judge = self._by_moments if self.chosen_.score == MOMENTS else self._by_segments
-        self._learn(judge(pool, jobs), pool.fps)
+        self._seen: set[str] = set()
+        self._learn(judge(pool, workers), pool.fps)
+        self.looked_at_ = tuple(camera for camera in pool.cameras if camera in self._seen)
         self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
         return self
 
@@ -176,15 +181,16 @@ from the whole video.
                 )
         return ()
 
-    def _by_moments(self, pool: Source, jobs: int) -> Judgement:
+    def _by_moments(self, pool: Source, workers: Workers) -> Judgement:
         """Judge by counterparts between the videos; segments only serve to show."""
         # Imported here because step lists need neither torch nor videos.
         from filtering.judging.moments import Timeline, judge_moments
         from filtering.moments.score import look
         from filtering.segmentation.agreed import agreed_segments
 
+        self._seen.update(self.cameras_)
         with self._timed("features"):
-            seen = look(pool, pool.episodes, self.cameras_, jobs=jobs)
+            seen = look(pool, pool.episodes, self.cameras_, workers=workers)
         episodes = pool.episodes
         timeline = Timeline([e.length for e in episodes], [e.name for e in episodes], pool.fps)
         with self._timed("weights"):
@@ -198,42 +204,47 @@ from the whole video.
             if self.chosen_.segmenter == AGREEMENT:
                 self.segments_ = agreed_segments(score.counterparts, timeline.lengths)
             else:
-                self.segments_ = self._segments(pool, jobs)
+                self.segments_ = self._segments(pool, workers)
         return judgement
 
-    def _by_segments(self, pool: Source, jobs: int) -> Judgement:
+    def _by_segments(self, pool: Source, workers: Workers) -> Judgement:
         """Judge by the sub-tasks and what is seen of them."""
         with self._timed("segments"):
-            self.segments_ = self._segments(pool, jobs)
+            self.segments_ = self._segments(pool, workers)
         with self._timed("features"):
-            evidence = self._evidence(pool, jobs)
+            evidence = self._evidence(pool, workers)
         # The matrices are small: several BLAS threads would only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
             return judge_named(self.chosen_.score)(evidence, self.chosen_)
 
-    def _segments(self, pool: Source, jobs: int) -> Segmentation:
+    def _segments(self, pool: Source, workers: Workers) -> Segmentation:
         chosen = self.chosen_
         segmenter = segmenter_named(chosen.segmenter, chosen.subtasks, self.cameras_)
-        return segmenter(pool, jobs=jobs)
+        found = segmenter(pool, workers=workers)
+        self._seen.update(found.cameras)
+        return found
 
-    def _evidence(self, pool: Source, jobs: int) -> Evidence:
+    def _evidence(self, pool: Source, workers: Workers) -> Evidence:
         """Return the evidence that the score uses."""
         known = Evidence(self.segments_.subtasks, self.segments_.spans)
         if self.chosen_.score == "equation3":
-            return replace(known, states=self._states(pool, jobs))
+            return replace(known, states=self._states(pool, workers))
         if self.config.effects and pool.cameras:
-            return replace(known, ineffective=self._ineffective(pool, known, jobs))
+            return replace(known, ineffective=self._ineffective(pool, known, workers))
         return known
 
-    def _ineffective(self, pool: Source, known: Evidence, jobs: int) -> list[NDArray[np.float64]]:
+    def _ineffective(
+        self, pool: Source, known: Evidence, workers: Workers
+    ) -> list[NDArray[np.float64]]:
         """Return per demonstration (q,): how surprisingly little each segment changed [nats]."""
         source = FrameSource(self.config.cameras or pool.cameras)
+        self._seen.update(source.cameras)
         rests = look_at_rests(
-            pool.episodes, self.segments_.spans, frame_rate(pool), source, jobs=jobs
+            pool.episodes, self.segments_.spans, frame_rate(pool), source, workers=workers
         )
         return effect_surprises([changes(rest) for rest in rests], known.labels)
 
-    def _states(self, pool: Source, jobs: int) -> list[NDArray[np.float64]]:
+    def _states(self, pool: Source, workers: Workers) -> list[NDArray[np.float64]]:
         """Return per demonstration (q, N): features of its segments; one-hot without pictures."""
         if not pool.cameras:
             eye = np.eye(len(self.segments_.subtasks))
@@ -244,14 +255,16 @@ from the whole video.
             from filtering.features.checkpoint import load_features
 
             learned = load_features(Path(self.config.features))
-            return reduce_features(learned.describe(pool, spans, jobs=jobs))
+            self._seen.add(learned.look.camera)
+            return reduce_features(learned.describe(pool, spans, workers=workers))
+        self._seen.update(self.cameras_)
         features = segment_features(
             pool,
             spans,
             cameras=self.cameras_,
             frames_per_segment=self.config.frames_per_segment,
             background=self.config.background,
-            jobs=jobs,
+            workers=workers,
         )
         return reduce_features(features)
 

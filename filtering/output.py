@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 from filtering.demo_filter import DemoFilter, caution
 from filtering.judging.explain import Clock
 from filtering.report import ReportSection, render_report
+from filtering.report.videos import FOLDER, foreign_videos, remove_videos
 from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
 from teasim.common.errors import ConfigError, TeasimError
 from teasim.common.files import write_json, write_text
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.segments_table import segment_rows, write_segments_table
 from teasim.pool.source import Source
 from teasim.pool.weight_table import write_weight_table
 
 FILES = ("weights.csv", "segments.csv", "filter.json", "keep.txt", "exclude.txt", "report.html")
-"""Files of an output folder."""
+"""Files of an output folder; beside them stands the folder of the page's videos, if any."""
 PACKAGES = ("teasim", "numpy", "scipy", "scikit-learn", "torch", "opencv-python-headless")
 """Packages whose versions are recorded, because weights may depend on them."""
 
@@ -51,7 +53,7 @@ def check_output(out: Path, source: Path, *, overwrite: bool) -> None:
     if not out.is_dir():
         raise ConfigError(f"The output '{out}' is a file; choose a folder.")
     present = {path.name for path in out.iterdir()}
-    foreign = sorted(present - set(FILES))
+    foreign = sorted(present - {*FILES, FOLDER}) + foreign_videos(out)
     if foreign:
         raise ConfigError(
             f"The output folder '{out}' holds other files ('{foreign[0]}'); "
@@ -71,8 +73,11 @@ def write_filter_output(
     *,
     sections: Sequence[ReportSection] = (),
     overwrite: bool = False,
+    workers: Workers = IN_PROCESS,
 ) -> None:
     """Write FILES to the folder `out`, each atomically, the page last.
+
+    Videos that are too large to embed in the page are in a folder `videos` beside it.
 
     An error while the page is made becomes a warning on stderr: the results are already written.
 
@@ -82,6 +87,7 @@ def write_filter_output(
         fitted: the filter after `fit(pool)`.
         sections: further sections of the page.
         overwrite: replace an earlier output.
+        workers: where the videos of the page are encoded.
 
     Raises:
         ConfigError: the folder is in use.
@@ -89,31 +95,38 @@ def write_filter_output(
     """
     folder = Path(out)
     check_output(folder, pool.root, overwrite=overwrite)
-    rows = fitted.table()
-    keep = [row.episode_index for row in rows if not row.flagged]
-    exclude = [row.episode_index for row in rows if row.flagged]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_weight_table(folder / "weights.csv", rows)
-        write_segments_table(folder / "segments.csv", segment_rows(pool, fitted.segments_.spans))
-        write_json(folder / "filter.json", run_record(fitted, pool))
-        write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
-        write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))
+        _write_results(folder, pool, fitted)
     except OSError as error:
         raise TeasimError(f"The output '{out}' cannot be written: {error.strerror}.") from error
     (folder / "report.html").unlink(missing_ok=True)  # never a page of other weights
     try:
         render_report(
             folder / "report.html",
-            demos=demo_views(pool, fitted),
+            demos=demo_views(pool, fitted, folder, workers=workers),
             threshold=fitted.threshold_,
             subtasks=fitted.segments_.subtasks,
             sections=sections,
             unit=Clock(pool.fps).unit,
         )
     except Exception as error:
+        remove_videos(folder)
         reason = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         print(f"teasim: warning: the page could not be made: {reason}.", file=sys.stderr)
+
+
+def _write_results(folder: Path, pool: Source, fitted: DemoFilter) -> None:
+    """Write what other tools read, and remove the videos of an earlier page."""
+    rows = fitted.table()
+    keep = [row.episode_index for row in rows if not row.flagged]
+    exclude = [row.episode_index for row in rows if row.flagged]
+    write_weight_table(folder / "weights.csv", rows)
+    write_segments_table(folder / "segments.csv", segment_rows(pool, fitted.segments_.spans))
+    write_json(folder / "filter.json", run_record(fitted, pool))
+    write_text(folder / "keep.txt", selection_text(pool, keep, keep=True))
+    write_text(folder / "exclude.txt", selection_text(pool, exclude, keep=False))
+    remove_videos(folder)
 
 
 def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
@@ -126,6 +139,7 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "pool_hash": pool.content_hash(),
         "versions": _versions(),
         "cameras": list(fitted.cameras_),
+        "cameras_looked_at": list(fitted.looked_at_),
         "subtasks": list(fitted.segments_.subtasks),
         "segmentation": _segmentation_record(fitted, pool),
         "segmentation_confidence": fitted.segments_.confidence(),

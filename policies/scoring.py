@@ -13,7 +13,7 @@ from policies.play.evaluation import evaluate_all
 from policies.play.joint_evaluation import evaluate_motion
 from policies.play.junit import Bar, write_junit
 from policies.play.results import as_json, motion_json, motion_summary, summary
-from policies.settings import EvaluateSettings, job_count
+from policies.settings import EvaluateSettings
 from teasim.common.errors import ConfigError
 from teasim.common.files import write_json
 
@@ -46,7 +46,7 @@ def _evaluate_subtasks(policy: SubtaskPolicy, settings: EvaluateSettings) -> int
     minimum = settings.min_policy_accuracy
     bar = None if minimum is None else Bar(minimum)
     rivals = [] if settings.against is None else [_load_rival(settings.against)]
-    scores, *others = evaluate_all([policy, *rivals], settings, jobs=job_count(settings.jobs))
+    scores, *others = evaluate_all([policy, *rivals], settings, workers=settings.workers)
     record = _record(settings, "subtask")
     print(summary(scores))
     for other in others:
@@ -80,7 +80,7 @@ def _evaluate_joints(policy: MotionPolicy, settings: EvaluateSettings) -> int:
             "A policy at the joint level chooses no sub-tasks; leave out --min-policy-accuracy, "
             "--against, --junit and --video."
         )
-    scores = evaluate_motion(policy, settings, jobs=job_count(settings.jobs))
+    scores = evaluate_motion(policy, settings, workers=settings.workers)
     print(motion_summary(scores))
     if settings.json:
         write_json(settings.json, _record(settings, "joint") | {"scores": motion_json(scores)})

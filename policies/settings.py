@@ -11,7 +11,7 @@ from typing import Annotated
 import tyro
 
 from teasim.common.errors import ConfigError
-from teasim.common.parallel import default_jobs
+from teasim.common.workers import WorkerOptions, Workers
 
 SUBTASK_ENVIRONMENT = "teasim:teasim/TeaMakingSubtasks-v0"
 """Gymnasium id of the environment whose actions are sub-tasks."""
@@ -21,11 +21,6 @@ JOINT_ENVIRONMENT = "teasim:teasim/TeaMaking-v0"
 Out = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 Repeated = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
 Assignments = Annotated[Repeated, tyro.conf.arg(name="set", metavar="NAME=VALUE")]
-
-
-def job_count(jobs: int | None) -> int:
-    """Return the number of processes: `jobs`, or one per core for None."""
-    return default_jobs() if jobs is None else jobs
 
 
 @dataclass(frozen=True)
@@ -87,8 +82,8 @@ class EvaluateSettings(EvaluationConfig):
     """File for all scores and episodes."""
     junit: Path | None = None
     """JUnit XML file for a build server."""
-    jobs: int | None = None
-    """Processes that run episodes; default: one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +116,8 @@ class TrainSettings:
     largest weights in the table."""
     seed: int = 0
     """Seed of the learner."""
-    jobs: int | None = None
-    """Processes that read the pool; default: one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
     @property
     def chosen_use(self) -> str:
@@ -138,8 +133,8 @@ class AblateSettings:
     """TOML file that says what is varied; docs/policies.md shows one."""
     out: Out
     """Folder for the results; an unfinished ablation in it is resumed."""
-    jobs: int | None = None
-    """Processes; default: one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,5 +155,5 @@ class DemoSettings:
     """Frames of each segment that the filter looks at; fewer than its default, for speed."""
     environment: Environment = field(default_factory=partial(EnvironmentConfig, max_actions=10))
     """The environment. Making tea takes 7 actions; a policy that needs 3 more has failed."""
-    jobs: int | None = None
-    """Processes; default: one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""

@@ -21,11 +21,12 @@ from policies.learners.registry import (
     find_learner,
     learners_that_need,
 )
-from policies.settings import TrainSettings, job_count
+from policies.settings import TrainSettings
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder
+from teasim.common.workers import Workers
 from teasim.pool import Pool
-from teasim.pool.soundness import require_sound
+from teasim.pool.soundness import print_notes, require_sound
 
 RECORDED = ("learner", "level", "observe", "camera", "expert", "seed")
 """Settings that are stored with a policy as they were given."""
@@ -36,15 +37,15 @@ class Level:
     """What a learner of a level is given."""
 
     load: Callable[..., DecisionSamples | MotionSamples]
-    """Reads the samples: (pool, demos config, jobs) -> samples."""
+    """Reads the samples: (pool, demos config, workers) -> samples."""
     unit: str
     """What a row of the samples is, in the plural."""
 
 
-def _load_motions(pool: Pool, demos: DemosConfig, *, jobs: int) -> MotionSamples:
+def _load_motions(pool: Pool, demos: DemosConfig, *, workers: Workers) -> MotionSamples:
     if demos.cameras:
         raise ConfigError("The level 'joint' sees no pictures; leave out --camera.")
-    return load_motions(pool, demos.observe, jobs=jobs)
+    return load_motions(pool, demos.observe, workers=workers)
 
 
 LEVELS: Mapping[str, Level] = MappingProxyType(
@@ -97,12 +98,13 @@ def train(settings: TrainSettings) -> Training:
     demos = DemosConfig(observe=settings.observe, cameras=settings.camera)
     pool = Pool.open(settings.pool)
     require_sound(pool)
+    print_notes(pool)
     weights = demo_weights(pool, settings.weights, settings.chosen_use)
     options |= provide(kind, pool, settings)
     check_new_folder(settings.out)
     began = time.perf_counter()
     level = LEVELS[settings.level]
-    samples = level.load(pool, demos, jobs=job_count(settings.jobs))
+    samples = level.load(pool, demos, workers=settings.workers)
     learner = kind.make(seed=settings.seed, **options).fit(samples, weights)
     record = {
         **{name: getattr(settings, name) for name in RECORDED},

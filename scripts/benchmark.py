@@ -1,8 +1,8 @@
 """Measure the processor time of images, demonstrations and environment steps.
 
-Generation, decoding and environment steps are compared with a baseline measured alternately in the
-same run: the same physics steps, images, encoded and decoded frames in bare loops, without the code
-of this project.
+Generation, decoding, features and environment steps are compared with a baseline measured
+alternately in the same run: the same physics steps, images, encoded and decoded frames in bare
+loops, without the code of this project; for features, the backbone alone.
 """
 
 import argparse
@@ -24,6 +24,8 @@ import av
 import gymnasium
 import mujoco
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from teasim.constants import (
     FPS,
@@ -34,6 +36,7 @@ from teasim.constants import (
 from teasim.generation import GenerateConfig, demo_rng, plan_pool
 from teasim.generation.recording import generate_demo
 from teasim.pool.clips import VideoClip, VideoWriter
+from teasim.pool.readers.registry import open_source
 from teasim.render import StationRenderer
 from teasim.rollout import demonstrate
 from teasim.world.simulation import Simulation
@@ -42,6 +45,8 @@ from teasim.world.station import nominal_layout
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 ENVIRONMENT_STEPS = 200
 DECODED_FRAMES = 300
+DESCRIBED_RATE = 5.0  # frames/s, as the segmenter `clustering`
+EPISODES = 10_000
 
 
 @dataclass
@@ -198,6 +203,91 @@ def bare_decoding(path: Path) -> None:
             frame.to_ndarray(format="rgb24")
 
 
+def features(repeats: int) -> dict[str, float]:
+    """Milliseconds per frame of decoding and describing an ordinary clip, and of its backbone.
+
+    The clip is what LeRobot records: AV1, 640 x 480 pixels, 30 frames/s, a key frame every second
+    frame, of which `DESCRIBED_RATE` frames per second are described.
+    """
+    from filtering.vision.backbone import describe_frames
+    from filtering.vision.frame_features import describe_clip, sampled_frames
+    from filtering.vision.frames import fitted_frames
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "video.mp4"
+        encode_av1(path)
+        clip = VideoClip.whole(path)
+        wanted = sampled_frames(clip.length, round(clip.length * DESCRIBED_RATE / clip.fps))
+        frames = np.concatenate(list(fitted_frames(clip, wanted)))
+        describe_frames(frames[:1])  # the first call reads the weights
+        works: dict[str, Callable[[], object]] = {
+            "features": lambda: describe_clip(clip, wanted),
+            "backbone": lambda: describe_frames(frames),
+        }
+        found = medians(works, repeats)
+    spent = {f"{name} per frame": 1000 * value / len(wanted) for name, value in found.items()}
+    return spent | {"ratio": found["features"] / found["backbone"]}
+
+
+def encode_av1(path: Path) -> None:
+    """Write what a fixed camera sees of a moving square, encoded as LeRobot encodes videos."""
+    os.environ.setdefault("SVT_LOG", "0")
+    rng = np.random.default_rng(0)
+    coarse = rng.integers(110, 160, (30, 40, 3), dtype=np.uint8)
+    table = coarse.repeat(16, axis=0).repeat(16, axis=1)
+    options = {"g": "2", "crf": "30", "preset": "12", "svtav1-params": "lp=1"}
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libsvtav1", 30, options=options)
+        stream.width, stream.height, stream.pix_fmt = 640, 480, "yuv420p"
+        for place in range(DECODED_FRAMES):
+            image = table + rng.integers(0, 5, (480, 640, 1), dtype=np.uint8)  # sensor noise
+            image[200:280, place : place + 80] = 60
+            frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+            frame.pts = place
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+
+
+def opening(repeats: int) -> dict[str, float]:
+    """Seconds to open a data set of `EPISODES` episodes."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_metadata(Path(folder))
+        found = medians({"open": lambda: open_source(folder)}, repeats)
+        assert len(open_source(folder).episodes) == EPISODES
+    return {f"{EPISODES} episodes": found["open"]}
+
+
+def write_metadata(root: Path) -> None:
+    """Write the metadata of a LeRobot data set v3.0 with `EPISODES` episodes of 1,800 frames."""
+    numbers, length, key = np.arange(EPISODES), 1800, "observation.images.left"
+    video = {"dtype": "video", "shape": [480, 640, 3], "names": ["height", "width", "channels"]}
+    info = {
+        "codebase_version": "v3.0",
+        "fps": 30,
+        "total_episodes": EPISODES,
+        "total_frames": EPISODES * length,
+        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+        "video_path": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
+        "features": {key: video},
+    }
+    table = {
+        "episode_index": numbers,
+        "length": np.full(EPISODES, length),
+        "tasks": [["make tea"]] * EPISODES,
+        "dataset_from_index": numbers * length,
+        "dataset_to_index": (numbers + 1) * length,
+        f"videos/{key}/from_timestamp": numbers % 10 * 60.0,
+        f"videos/{key}/to_timestamp": (numbers % 10 + 1) * 60.0,
+    }
+    for place in ("data", f"videos/{key}"):
+        table |= {f"{place}/chunk_index": numbers // 10000, f"{place}/file_index": numbers // 10}
+    target = root / "meta/episodes/chunk-000/file-000.parquet"
+    target.parent.mkdir(parents=True)
+    pq.write_table(pa.table(table), target)
+    (root / "meta/info.json").write_text(json.dumps(info))
+    pq.write_table(pa.table({"task_index": [0], "task": ["make tea"]}), root / "meta/tasks.parquet")
+
+
 def environment(repeats: int) -> dict[str, float]:
     """Steps per second of the joint environment and of its physics alone; ratio of their costs."""
     env = gymnasium.make("teasim:teasim/TeaMaking-v0", max_episode_steps=10**9)
@@ -252,6 +342,8 @@ def main() -> None:
         "images [ms]": images(given.size, given.repeats),
         "generation [s]": generation(given.size, given.repeats),
         "decoding [ms]": decoding(given.size, given.repeats),
+        "features of AV1 [ms]": features(given.repeats),
+        "opening [s]": opening(given.repeats),
         "joint environment": environment(given.repeats),
     }
     show(results)

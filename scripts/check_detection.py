@@ -23,6 +23,7 @@ from filtering.judging.norm.steps import StepList
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.vision.frame_features import FrameSource
 from teasim.common.statistics import auroc, wilson_interval
+from teasim.common.workers import Workers
 from teasim.pool import Pool, Span
 from teasim.task.recipes import PRECEDENCE
 
@@ -75,19 +76,19 @@ class Outcome:
 
 
 def bank(
-    pools: Iterable[Path], segmenter: str, effects: bool, jobs: int
+    pools: Iterable[Path], segmenter: str, effects: bool, workers: Workers
 ) -> tuple[list[Demo], tuple[str, ...]]:
     """Segment all demonstrations; return them and the names of the sub-tasks."""
     demos: list[Demo] = []
     names: tuple[str, ...] = ()
     for path in pools:
         pool = Pool.open(path)
-        found = segmenter_named(segmenter)(pool, jobs=jobs)
+        found = segmenter_named(segmenter)(pool, workers=workers)
         names = found.subtasks
         source = FrameSource(pool.cameras)
         rests = [None] * len(pool.episodes)
         if effects:
-            rests = look_at_rests(pool.episodes, found.spans, pool.fps, source, jobs=jobs)
+            rests = look_at_rests(pool.episodes, found.spans, pool.fps, source, workers=workers)
         for episode, spans, rest in zip(pool.episodes, found.spans, rests, strict=True):
             record = episode.record
             if record is not None and episode.demo_id not in found.labelled:
@@ -228,7 +229,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1, help="worker processes")
     arguments = parser.parse_args()
     effects = not arguments.no_effects
-    demos, subtasks = bank(arguments.bank, arguments.segmenter, effects, arguments.jobs)
+    demos, subtasks = bank(arguments.bank, arguments.segmenter, effects, Workers(arguments.jobs))
     print(f"bank: {len(demos)} demonstrations")
     TABLES[arguments.table](Draws(demos, subtasks, arguments.pools))
     return 0

@@ -13,8 +13,8 @@ import numpy as np
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.vision.frame_features import FrameSource
-from teasim.common.parallel import default_jobs
 from teasim.common.statistics import auroc
+from teasim.common.workers import Workers, default_jobs
 from teasim.pool import Pool
 
 NOTICED = 2.0
@@ -30,16 +30,16 @@ def main() -> int:
     arguments = parser.parse_args()
     source = FrameSource(tuple(arguments.cameras))
     for root in arguments.pools:
-        notice(Pool.open(root), source, arguments.jobs)
+        notice(Pool.open(root), source, Workers(arguments.jobs))
     return 0
 
 
-def notice(pool: Pool, source: FrameSource, jobs: int) -> None:
+def notice(pool: Pool, source: FrameSource, workers: Workers) -> None:
     """Print the largest surprise of demonstrations by their mistakes."""
     names = _names(pool)
     known = sorted({name for done in names for name in done})
     labels = [[known.index(name) for name in done] for done in names]
-    rests = _rests(pool, source, jobs)
+    rests = _rests(pool, source, workers)
     worst = np.array([nats.max() for nats in effect_surprises([changes(r) for r in rests], labels)])
     kinds = np.array([_kind(pool, number) for number in range(len(worst))])
     print(f"{pool.root.name}, largest surprise of a demonstration, nats")
@@ -59,9 +59,9 @@ def _kind(pool: Pool, number: int) -> str:
     return " ".join(f"{m.name}@{m.subtask}" for m in record.mistakes[:1]) or record.sequence
 
 
-def _rests(pool: Pool, source: FrameSource, jobs: int) -> list[np.ndarray]:
+def _rests(pool: Pool, source: FrameSource, workers: Workers) -> list[np.ndarray]:
     segments = [episode.spans() for episode in pool.episodes]
-    return look_at_rests(pool.episodes, segments, pool.fps, source, jobs=jobs)
+    return look_at_rests(pool.episodes, segments, pool.fps, source, workers=workers)
 
 
 def _names(pool: Pool) -> Sequence[Sequence[str]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from teasim.common.parallel import default_jobs
+from teasim.common.workers import Workers, default_jobs
 from teasim.generation import GenerateConfig, generate
 from teasim.pool import Pool
 
@@ -53,9 +53,13 @@ def check(arguments: argparse.Namespace, seed: int) -> Counts:
     root = arguments.folder / f"seed-{seed}"
     config = GenerateConfig(arguments.seq1, 0, arguments.seq3, cameras=("left",), seed=seed)
     finished = (root / "meta" / "info.json").exists()
-    pool = Pool.open(root) if finished else generate(root, config, jobs=arguments.jobs).pool
+    pool = (
+        Pool.open(root)
+        if finished
+        else generate(root, config, workers=Workers(arguments.jobs)).pool
+    )
     settings = FilterConfig(frames_per_segment=arguments.frames_per_segment)
-    flagged = DemoFilter(settings).fit(pool, jobs=arguments.jobs).flagged_
+    flagged = DemoFilter(settings).fit(pool, workers=Workers(arguments.jobs)).flagged_
     correct = [episode.record.correct for episode in pool.episodes if episode.record is not None]
     pairs = list(zip(flagged.tolist(), correct, strict=True))
     return Counts(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from teasim.common.parallel import default_jobs
+from teasim.common.workers import Workers, default_jobs
 from teasim.generation import GenerateConfig, generate
 from teasim.pool import Pool
 from teasim.pool.leakage import CLUES, leakage
@@ -54,7 +54,7 @@ def _pool(arguments: argparse.Namespace, seed: int) -> Pool:
         size=arguments.size,
         seed=seed,
     )
-    return generate(root, config, jobs=arguments.jobs).pool
+    return generate(root, config, workers=Workers(arguments.jobs)).pool
 
 
 if __name__ == "__main__":

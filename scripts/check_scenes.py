@@ -21,6 +21,7 @@ from filtering.moments.score import MomentScore, look, score_moments
 from filtering.moments.vectors import Video
 from filtering.vision.frame_features import sampled_frames
 from teasim.common.statistics import auroc
+from teasim.common.workers import Workers
 from teasim.pool import Pool
 from teasim.pool.lerobot import Episode
 
@@ -75,7 +76,9 @@ def main() -> int:
     chosen = [s.name for s in (HELD_BACK if arguments.held_back else TUNED_ON)]
     print(f"{'scene':10}{'kind':14}{'AUROC':>7}{'found':>8}{'accused':>9}{'silent':>8}{'place':>7}")
     for name in arguments.scenes if arguments.scenes is not None else chosen:
-        pool = make_bank(arguments.folder / name, SCENES[name], seed=0, jobs=arguments.jobs)
+        pool = make_bank(
+            arguments.folder / name, SCENES[name], seed=0, workers=Workers(arguments.jobs)
+        )
         judge(bank_of(name, pool, pool.cameras, arguments), arguments)
     for root in arguments.tea:
         pool = Pool.open(root)
@@ -95,7 +98,7 @@ def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.N
         )
     )
     episodes = [pool.episodes[number] for number in chosen]
-    seen = look(pool, episodes, cameras, jobs=arguments.jobs)
+    seen = look(pool, episodes, cameras, workers=Workers(arguments.jobs))
     return Bank(name, pool, episodes, seen, kinds[chosen])
 
 

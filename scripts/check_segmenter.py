@@ -20,6 +20,7 @@ from filtering.segmentation.mstcn.training import MSTCNLearner
 from filtering.segmentation.scoring import score_episodes
 from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource, frame_features
+from teasim.common.workers import Workers
 from teasim.pool import Episode, Pool
 
 
@@ -52,7 +53,7 @@ def fit(parts: Sequence[Part], arguments: argparse.Namespace, seed: int) -> MSTC
     source = FrameSource(tuple(arguments.cameras), arguments.rate)
     videos = []
     for p in parts:
-        features = frame_features(p.episodes, p.pool.fps, source, jobs=arguments.jobs)
+        features = frame_features(p.episodes, p.pool.fps, source, workers=Workers(arguments.jobs))
         videos += labelled_videos(p.episodes, features, subtasks)
     n_labels = max(len(subtasks), 1 + max(int(video.labels.max()) for video in videos))
     config = MSTCNConfig(seed=seed, scaling=arguments.scaling, epochs=arguments.epochs)
@@ -103,7 +104,9 @@ def main() -> int:
     for seed in range(arguments.seeds):
         segmenter = fit(arguments.train, arguments, seed)
         for p in arguments.test:
-            segments = segmenter.segment_episodes(p.pool, p.episodes, jobs=arguments.jobs)
+            segments = segmenter.segment_episodes(
+                p.pool, p.episodes, workers=Workers(arguments.jobs)
+            )
             for order, scores in by_order(p, segments).items():
                 found.setdefault((p.name, order), []).append(scores)
     print(f"{'pool':24}{'order':10}{'videos':>7}  accuracy (lowest)   edit (lowest)  F1@50")

@@ -17,6 +17,7 @@ from filtering.segmentation.clustering import RATE, looks, subtask_count
 from filtering.segmentation.discovery import Discovery, discover
 from filtering.vision.frame_features import FrameSource, sampled_frames
 from filtering.vision.frames import main_camera
+from teasim.common.workers import IN_PROCESS
 from teasim.pool import Pool
 from teasim.pool.types import index_from_spans
 
@@ -54,7 +55,9 @@ def main() -> int:
 def read(root: Path) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return features and true labels of the moments of every demonstration of a pool."""
     pool = Pool.open(root)
-    videos = looks(pool.episodes, pool.fps, FrameSource((main_camera(pool),), RATE), jobs=1)
+    videos = looks(
+        pool.episodes, pool.fps, FrameSource((main_camera(pool),), RATE), workers=IN_PROCESS
+    )
     columns = [index_from_spans(e.spans(), pool.subtasks, e.length) for e in pool.episodes]
     return [
         (video, np.asarray(column)[sampled_frames(len(column), len(video))])

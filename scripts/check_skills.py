@@ -12,7 +12,8 @@ from functools import partial
 import numpy as np
 
 from teasim.common.errors import SkillError
-from teasim.common.parallel import default_jobs, run
+from teasim.common.parallel import run
+from teasim.common.workers import Workers, default_jobs
 from teasim.generation.plan import DemoPlan
 from teasim.generation.recording import mismatch
 from teasim.rollout import demonstrate
@@ -119,7 +120,9 @@ def main() -> int:
     if given.seeds < 1 or given.jobs < 1:
         parser.error("--seeds and --jobs have to be 1 or more")
     seeds = range(given.first_seed, given.first_seed + given.seeds)
-    reports = run(partial(check, given), seeds, jobs=given.jobs, description="demonstrations")
+    reports = run(
+        partial(check, given), seeds, workers=Workers(given.jobs), description="demonstrations"
+    )
     bad = [report for report in reports if report.complaints]
     for report in bad:
         print(f"seed {report.seed}: {'; '.join(report.complaints)}")

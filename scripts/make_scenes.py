@@ -8,6 +8,8 @@ from pathlib import Path
 from scenes.registry import SCENES
 from scenes.writing import make_bank
 
+from teasim.common.workers import Workers
+
 
 def main() -> int:
     """Write them; those that are there stay as they are."""
@@ -20,7 +22,10 @@ def main() -> int:
     for name in arguments.scenes:
         start = time.perf_counter()
         pool = make_bank(
-            arguments.folder / name, SCENES[name], seed=arguments.seed, jobs=arguments.jobs
+            arguments.folder / name,
+            SCENES[name],
+            seed=arguments.seed,
+            workers=Workers(arguments.jobs),
         )
         seconds = time.perf_counter() - start
         print(f"{name}: {len(pool.episodes)} videos, {seconds:.0f} s", flush=True)

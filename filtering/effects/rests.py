@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.vision.cache import ArrayCache, default_folder
+from filtering.vision.cache import default_folder
 from filtering.vision.frame_features import (
     FrameSource,
     clip_key,
@@ -22,6 +22,7 @@ from filtering.vision.frame_features import (
     sampled_frames,
     side_by_side,
 )
+from teasim.common.workers import Workers
 from teasim.pool import Span
 from teasim.pool.source import Clip, Demonstration
 
@@ -38,6 +39,8 @@ class RestTask:
 
     clip: Clip
     """Where the frames are."""
+    camera: str
+    """Name of the camera."""
     frames: tuple[int, ...]
     """Numbers of the frames, in order."""
     cache_folder: Path
@@ -64,7 +67,7 @@ def look_at_rests(
     fps: float,
     source: FrameSource,
     *,
-    jobs: int,
+    workers: Workers,
 ) -> list[NDArray[np.float64]]:
     """Return per demonstration `rest_features` (q + 1, F), computed from these frames alone.
 
@@ -73,7 +76,7 @@ def look_at_rests(
         segments: the segments of each.
         fps: frames per second of their videos.
         source: cameras and rate.
-        jobs: worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
@@ -87,8 +90,8 @@ def look_at_rests(
         places.append([np.searchsorted(used, numbers) for numbers in chosen])
         for camera in source.cameras:
             seen = tuple(frames[used].tolist())
-            tasks.append(RestTask(episode.clip(camera), seen, default_folder()))
-    described = look_up_or_describe(tasks, _key, describe_rests, jobs)
+            tasks.append(RestTask(episode.clip(camera), camera, seen, default_folder()))
+    described = look_up_or_describe(tasks, _key, describe_rests, workers)
     videos = side_by_side(described, len(source.cameras))
     return [_means(moments, chosen) for moments, chosen in zip(videos, places, strict=True)]
 
@@ -123,10 +126,8 @@ def rest_moments(
 
 
 def describe_rests(task: RestTask) -> NDArray[np.float32]:
-    """Return the features (n, F) of the frames of `task`, and cache them."""
-    features = describe_clip(task.clip, np.array(task.frames))
-    ArrayCache(task.cache_folder).put(_key(task), features)
-    return features
+    """Return the features (n, F) of the frames of `task`."""
+    return describe_clip(task.clip, np.array(task.frames))
 
 
 def _means(

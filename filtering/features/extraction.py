@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.vision.background import subtraction_named
-from filtering.vision.cache import ArrayCache, default_folder
+from filtering.vision.cache import default_folder
 from filtering.vision.frame_features import clip_key, look_up_or_describe, side_by_side
-from filtering.vision.frames import Frames, fit_size, segment_indices, uniform_indices
+from filtering.vision.frames import Frames, fitted_frames, segment_indices, uniform_indices
+from teasim.common.workers import Workers
 from teasim.pool import Span
 from teasim.pool.source import Clip, Source
 
@@ -27,6 +28,8 @@ class VideoTask:
 
     clip: Clip
     """Where the frames are."""
+    camera: str
+    """Name of the camera."""
     spans: tuple[Span, ...]
     """The segments [frames]."""
     frames_per_segment: int
@@ -44,7 +47,7 @@ def segment_features(
     cameras: Sequence[str],
     frames_per_segment: int,
     background: str,
-    jobs: int,
+    workers: Workers,
 ) -> list[NDArray[np.float32]]:
     """Return per demonstration features (q, F) of its segments.
 
@@ -54,29 +57,34 @@ def segment_features(
         cameras: cameras to use; their features are concatenated.
         frames_per_segment: largest number of frames used per segment.
         background: name of the background subtraction.
-        jobs: worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
     """
     subtraction_named(background)
     tasks = [
-        VideoTask(episode.clip(camera), spans, frames_per_segment, background, default_folder())
+        VideoTask(
+            clip=episode.clip(camera),
+            camera=camera,
+            spans=spans,
+            frames_per_segment=frames_per_segment,
+            background=background,
+            cache_folder=default_folder(),
+        )
         for episode, spans in zip(pool.episodes, segments, strict=True)
         for camera in cameras
     ]
-    frames = look_up_or_describe(tasks, _key, describe_video, jobs)
+    frames = look_up_or_describe(tasks, _key, describe_video, workers)
     described = [pool_over_time(task, found) for task, found in zip(tasks, frames, strict=True)]
     return side_by_side(described, len(cameras))
 
 
 def describe_video(task: VideoTask) -> NDArray[np.float32]:
-    """Return the features (n, FRAME_FEATURES) of the n frames of `task`, and cache them."""
+    """Return the features (n, FRAME_FEATURES) of the n frames of `task`."""
     from filtering.vision.backbone import describe_frames
 
-    features = describe_frames(foreground(task.clip, _frames_of(task), task.background))
-    ArrayCache(task.cache_folder).put(_key(task), features)
-    return features
+    return describe_frames(foreground(task.clip, _frames_of(task), task.background))
 
 
 def foreground(clip: Clip, indices: NDArray[np.int64], background: str) -> Frames:
@@ -88,7 +96,7 @@ def foreground(clip: Clip, indices: NDArray[np.int64], background: str) -> Frame
     """
     overview = uniform_indices(0, clip.length, OVERVIEW)
     wanted = np.unique(np.concatenate([indices, overview]))
-    frames = fit_size(clip.frames(wanted))
+    frames = np.concatenate(list(fitted_frames(clip, wanted)))
     return subtraction_named(background)(
         frames[np.searchsorted(wanted, indices)], frames[np.searchsorted(wanted, overview)]
     )

@@ -16,6 +16,7 @@ from filtering.features.extraction import segment_maps
 from filtering.features.generator import FeatureGenerator
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
 from teasim.pool.source import Clip, Demonstration, Source
 
@@ -44,14 +45,14 @@ class LearnedFeatures:
     """Activations over time to one vector."""
 
     def describe(
-        self, pool: Source, segments: Sequence[tuple[Span, ...]], *, jobs: int
+        self, pool: Source, segments: Sequence[tuple[Span, ...]], *, workers: Workers
     ) -> list[NDArray[np.float64]]:
         """Return per demonstration features (q, N) of its segments.
 
         Args:
             pool: where the videos are.
             segments: the segments of each demonstration.
-            jobs: worker processes; the result does not depend on it.
+            workers: where the work runs; the result does not depend on it.
 
         Raises:
             ConfigError: the pool lacks the camera that the features were learned from.
@@ -66,7 +67,7 @@ class LearnedFeatures:
             _Task(episode.clip(self.look.camera), spans, self)
             for episode, spans in zip(pool.episodes, segments, strict=True)
         ]
-        return parallel.run(_describe, tasks, jobs=jobs, description="describing segments")
+        return parallel.run(_describe, tasks, workers=workers, description="describing segments")
 
 
 def learn_features(
@@ -76,7 +77,7 @@ def learn_features(
     bottleneck: BottleneckConfig | None = None,
     generator: GeneratorConfig | None = None,
     *,
-    jobs: int = 1,
+    workers: Workers = IN_PROCESS,
 ) -> LearnedFeatures:
     """Learn from the labelled segments of `episodes`; settings that are None are the defaults.
 
@@ -85,7 +86,7 @@ def learn_features(
         PoolError: a video is missing or damaged.
     """
     tasks = [_MapsTask(episode.clip(look.camera), episode.spans(), look) for episode in episodes]
-    found = parallel.run(_maps, tasks, jobs=jobs, description="describing labelled segments")
+    found = parallel.run(_maps, tasks, workers=workers, description="describing labelled segments")
     clips = [maps for video in found for maps in video]
     labels = [subtasks.index(span.subtask) for task in tasks for span in task.spans]
     reduced = Bottleneck(bottleneck).fit(clips, labels)

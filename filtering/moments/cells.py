@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.vision.cache import ArrayCache, default_folder
+from filtering.vision.cache import default_folder
 from filtering.vision.frame_features import (
     CHUNK,
     FrameSource,
@@ -16,6 +16,7 @@ from filtering.vision.frame_features import (
     sample_count,
     sampled_frames,
 )
+from teasim.common.workers import Workers
 from teasim.pool.source import Demonstration
 
 SHORT_SIDE = 36
@@ -23,7 +24,7 @@ SHORT_SIDE = 36
 
 
 def cell_pictures(
-    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, jobs: int
+    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, workers: Workers
 ) -> list[NDArray[np.uint8]]:
     """Return per demonstration the area averages of cells, (n, H, W, 3) uint8 RGB.
 
@@ -31,7 +32,7 @@ def cell_pictures(
         episodes: the demonstrations.
         fps: frames per second of their videos.
         source: one camera, and the moments per second.
-        jobs: worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
@@ -40,17 +41,18 @@ def cell_pictures(
     tasks = [
         FrameTask(
             episode.clip(camera),
+            camera,
             sample_count(episode.length, fps, source.rate),
             default_folder(),
         )
         for episode in episodes
     ]
-    found = look_up_or_describe(tasks, _key, describe_cells, jobs)
+    found = look_up_or_describe(tasks, _key, describe_cells, workers)
     return [np.asarray(cells, dtype=np.uint8) for cells in found]
 
 
 def describe_cells(task: FrameTask) -> NDArray[np.float32]:
-    """Return the cells (n, H, W, 3) of the moments of `task`, and cache them."""
+    """Return the cells (n, H, W, 3) of the moments of `task`."""
     import cv2
 
     stream = task.clip.stream(sampled_frames(task.clip.length, task.count))
@@ -60,9 +62,7 @@ def describe_cells(task: FrameTask) -> NDArray[np.float32]:
         scale = SHORT_SIDE / min(height, width)
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
         parts += [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in images]
-    cells = np.stack(parts).astype(np.uint8)
-    ArrayCache(task.cache_folder).put(_key(task), cells)
-    return cells  # type: ignore[return-value]
+    return np.stack(parts).astype(np.uint8)
 
 
 def _key(task: FrameTask) -> str:

@@ -22,6 +22,7 @@ from filtering.moments.vectors import Video, moment_vectors
 from filtering.vision.frame_features import FrameSource, frame_features
 from filtering.vision.frames import frame_rate
 from teasim.common.errors import ConfigError
+from teasim.common.workers import Workers
 from teasim.pool.source import Demonstration, Source
 
 RATE = 5.0
@@ -70,7 +71,7 @@ class MomentScore:
 
 
 def look(
-    pool: Source, episodes: Sequence[Demonstration], cameras: Sequence[str], *, jobs: int
+    pool: Source, episodes: Sequence[Demonstration], cameras: Sequence[str], *, workers: Workers
 ) -> dict[str, list[Video]]:
     """Return per camera what it saw of each of `episodes`; cached.
 
@@ -81,8 +82,8 @@ def look(
     fps, seen = frame_rate(pool), {}
     for camera in cameras:
         source = FrameSource((camera,), RATE)
-        looks = frame_features(episodes, fps, source, jobs=jobs)
-        cells = cell_pictures(episodes, fps, source, jobs=jobs)
+        looks = frame_features(episodes, fps, source, workers=workers)
+        cells = cell_pictures(episodes, fps, source, workers=workers)
         seen[camera] = [Video(*both) for both in zip(looks, cells, strict=True)]
     return seen
 

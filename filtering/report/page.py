@@ -1,6 +1,5 @@
-"""A self-contained HTML page: no file beside it, no network."""
+"""The HTML page: it needs no network, and no file beside it but videos that are too large."""
 
-import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,8 +64,8 @@ class DemoView:
     """Its timeline."""
     marks: tuple[Mark, ...] = ()
     """Unusual places."""
-    video: bytes | None = None
-    """The mp4 that is shown, None for none."""
+    video: str | None = None
+    """Address of the mp4 that is shown: a data URL or a path beside the page; None for none."""
     name: str = ""
     """Heading; empty means its number."""
 
@@ -141,7 +140,6 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["spoken"] = _spoken
-    environment.filters["data_url"] = _data_url
     environment.filters["trusted"] = lambda html: Markup(html)
     return environment
 
@@ -160,10 +158,6 @@ def _colour(number: int) -> str:
 def _spoken(text: str) -> str:
     """Return the name of a sub-task as words."""
     return text.replace("_", " ")
-
-
-def _data_url(video: bytes) -> str:
-    return "data:video/mp4;base64," + base64.b64encode(video).decode("ascii")
 
 
 def _count_flagged(demos: Sequence[DemoView]) -> str:

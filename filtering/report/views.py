@@ -1,38 +1,50 @@
 """The views of the page from a fitted filter and its pool."""
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
 
 from filtering.demo_filter import DemoFilter
 from filtering.judging.explain import Clock, Finding, gravest
 from filtering.report.layout import Mark
 from filtering.report.page import DemoView, Segment
+from filtering.report.videos import page_videos
 from filtering.vision.frames import frame_rate
-from teasim.pool.clips import VideoWriter
-from teasim.pool.source import Clip, Source
+from teasim.common.workers import IN_PROCESS, Workers
+from teasim.pool.source import Source
 
 
-def demo_views(pool: Source, fitted: DemoFilter) -> list[DemoView]:
+def demo_views(
+    pool: Source, fitted: DemoFilter, beside: Path, *, workers: Workers = IN_PROCESS
+) -> list[DemoView]:
     """Return one view per demonstration, in the order of the pool.
+
+    Args:
+        pool: what was filtered.
+        fitted: the filter after `fit(pool)`.
+        beside: folder of the page, where videos are written that are too large to embed.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged.
     """
-    return [_view(pool, fitted, row) for row in range(len(pool.episodes))]
+    videos = {}
+    if fitted.cameras_:
+        clips = {episode.index: episode.clip(fitted.cameras_[0]) for episode in pool.episodes}
+        videos = page_videos(clips, frame_rate(pool), beside, workers=workers)
+    return [
+        _view(pool, fitted, row, videos.get(episode.index))
+        for row, episode in enumerate(pool.episodes)
+    ]
 
 
-def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
+def _view(pool: Source, fitted: DemoFilter, row: int, video: str | None) -> DemoView:
     clock = Clock(pool.fps)
     spans = fitted.segments_.spans[row]
     flagged = bool(fitted.flagged_[row])
     episode = pool.episodes[row]
-    clip = episode.clip(fitted.cameras_[0]) if fitted.cameras_ else None
     return DemoView(
         episode_index=episode.index,
-        name=episode.name[:1].upper() + episode.name[1:] if clip else episode.name,
+        name=episode.name[:1].upper() + episode.name[1:] if video else episode.name,
         demo_id=episode.demo_id,
         weight=float(fitted.weights_[row]),
         loss=float(fitted.losses_[row]),
@@ -42,7 +54,7 @@ def _view(pool: Source, fitted: DemoFilter, row: int) -> DemoView:
         seconds=clock.time(episode.length),
         segments=tuple(Segment(s.subtask, clock.time(s.start), clock.time(s.stop)) for s in spans),
         marks=marks_of(fitted.findings_[row], clock) if flagged else (),
-        video=None if clip is None else _mp4_of(clip, frame_rate(pool)),
+        video=video,
     )
 
 
@@ -62,18 +74,3 @@ def _mark(finding: Finding, clock: Clock) -> Mark:
     else:
         text = f"{finding.expected} {'is missing' if finding.missing else 'expected'}"
     return Mark(clock.time(finding.frame), text)
-
-
-def _mp4_of(clip: Clip, fps: float) -> bytes:
-    """Return the clip as an mp4; formats that browsers do not play are encoded again."""
-    stored = clip.mp4()
-    if stored is not None:
-        return stored
-    height, width, _ = clip.frames([0])[0].shape
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "clip.mp4"
-        writer = VideoWriter(path, height=height, width=width, fps=fps)
-        for image in clip.stream(np.arange(clip.length)):
-            writer.add(image)
-        writer.close()
-        return path.read_bytes()

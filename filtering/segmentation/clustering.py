@@ -17,6 +17,7 @@ from filtering.segmentation.segments import Segmentation, spans_of
 from filtering.vision.frame_features import FrameSource, frame_features, moment_of_frames
 from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.source import Demonstration, Source
 
 AUTO = "auto"
@@ -29,13 +30,17 @@ AVERAGES = 112
 
 
 def clustering(
-    pool: Source, *, jobs: int = 1, subtasks: int | None = None, cameras: tuple[str, ...] = ()
+    pool: Source,
+    *,
+    workers: Workers = IN_PROCESS,
+    subtasks: int | None = None,
+    cameras: tuple[str, ...] = (),
 ) -> Segmentation:
     """Find the sub-tasks that the demonstrations of a pool share; labels are not read.
 
     Args:
         pool: two or more demonstrations.
-        jobs: number of worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
         subtasks: number of sub-tasks; None infers it.
         cameras: cameras to use; empty means the main one.
 
@@ -52,7 +57,7 @@ def clustering(
     # Sorted, so that the order of the pool does not even change rounding.
     order = sorted(range(len(pool.episodes)), key=lambda number: pool.episodes[number].demo_id)
     episodes = [pool.episodes[number] for number in order]
-    videos = looks(episodes, frame_rate(pool), source, jobs=jobs)
+    videos = looks(episodes, frame_rate(pool), source, workers=workers)
     longest = max(map(len, videos))
     if subtasks is not None and subtasks > longest:
         raise ConfigError(
@@ -69,17 +74,20 @@ def clustering(
         spans[number] = spans_of(found.labels[place][nearest], posteriors[number], names)
     numbers = range(len(order))
     return Segmentation(
-        names, tuple(spans[n] for n in numbers), tuple(posteriors[n] for n in numbers)
+        names,
+        tuple(spans[n] for n in numbers),
+        tuple(posteriors[n] for n in numbers),
+        cameras=source.cameras,
     )
 
 
 def looks(
-    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, jobs: int
+    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, workers: Workers
 ) -> list[NDArray[np.float64]]:
     """Return per demonstration features (n, F), each scaled within its video."""
     width = len(source.cameras)
     videos = []
-    for moments in frame_features(episodes, fps, source, jobs=jobs):
+    for moments in frame_features(episodes, fps, source, workers=workers):
         blocks = [camera[:, :AVERAGES] for camera in np.split(moments, width, axis=1)]
         videos.append(scaled(np.hstack(blocks), "video").astype(np.float64))
     return videos

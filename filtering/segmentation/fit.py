@@ -21,8 +21,9 @@ from filtering.vision.frame_features import FrameSource, frame_features, sampled
 from filtering.vision.frames import chosen_cameras, frame_rate
 from teasim.common.errors import ConfigError, PoolError
 from teasim.common.files import check_new_folder
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.readers.registry import open_source
-from teasim.pool.soundness import require_sound
+from teasim.pool.soundness import print_notes, require_sound
 from teasim.pool.source import Demonstration, Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
@@ -47,7 +48,9 @@ class FitResult:
     """Measures of the segmentation, by part of the pool."""
 
 
-def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) -> FitResult:
+def fit_segmenter(
+    source: Path, out: Path, config: FitConfig, *, workers: Workers = IN_PROCESS
+) -> FitResult:
     """Fit MS-TCN++ to labelled demonstrations of `source` and save it in the new folder `out`.
 
     `out` is created last, so that bad input leaves nothing behind.
@@ -60,18 +63,19 @@ def fit_segmenter(source: Path, out: Path, config: FitConfig, *, jobs: int = 1) 
     pool = open_source(source)
     check_new_folder(out)
     require_sound(pool)
+    print_notes(pool)
     frames = FrameSource(chosen_cameras(pool, config.cameras) or pool.cameras, config.rate)
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
-    segmenter, history = _fit(pool, chosen, subtasks, frames, config=config, jobs=jobs)
+    segmenter, history = _fit(pool, chosen, subtasks, frames, config=config, workers=workers)
     look = LookConfig(frames.cameras[0])
-    learned = learn_features(chosen, subtasks, look, jobs=jobs) if config.features else None
+    learned = learn_features(chosen, subtasks, look, workers=workers) if config.features else None
     tried = [*chosen, *_draw(others, CHECKED, config.network.seed)]
     result = FitResult(
         labelled=tuple(episode.index for episode in chosen),
         never_shown=tuple(sorted(_shown(others) - _shown(chosen))),
         loss=history[-1],
-        scores=score_episodes(tried, segmenter.segment_episodes(pool, tried, jobs=jobs)),
+        scores=score_episodes(tried, segmenter.segment_episodes(pool, tried, workers=workers)),
     )
     record = _record(pool, config, result, history, time.perf_counter() - began)
     if learned is not None:
@@ -87,11 +91,13 @@ def _fit(
     frames: FrameSource,
     *,
     config: FitConfig,
-    jobs: int,
+    workers: Workers,
 ) -> tuple[MSTCNSegmenter, tuple[float, ...]]:
     """Return the segmenter and the mean loss of each epoch."""
     rate = frame_rate(pool)
-    videos = labelled_videos(chosen, frame_features(chosen, rate, frames, jobs=jobs), subtasks)
+    videos = labelled_videos(
+        chosen, frame_features(chosen, rate, frames, workers=workers), subtasks
+    )
     # Frames of no sub-task, where there are any, get one more label, the last.
     n_labels = max(len(subtasks), 1 + max(int(video.labels.max()) for video in videos))
     learner = MSTCNLearner(config.network).fit(videos, n_labels)

@@ -10,9 +10,10 @@ from filtering.segmentation.mstcn.segmenter import MSTCNSegmenter
 from filtering.segmentation.scoring import UNSEEN, ScoresByPart, score_episodes, scores_json
 from filtering.segmentation.segments import decode
 from teasim.common.files import check_new_folder, write_json
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
 from teasim.pool.readers.registry import open_source
-from teasim.pool.soundness import require_sound
+from teasim.pool.soundness import print_notes, require_sound
 from teasim.pool.source import Source
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 
@@ -20,7 +21,9 @@ METRICS_FILE = "metrics.json"
 """Name of the file of measures in the output folder."""
 
 
-def predict(segmenter_folder: Path, source: Path, out: Path, *, jobs: int = 1) -> ScoresByPart:
+def predict(
+    segmenter_folder: Path, source: Path, out: Path, *, workers: Workers = IN_PROCESS
+) -> ScoresByPart:
     """Segment a pool or an MS-TCN folder and write the result to the new folder `out`.
 
     `out` is an MS-TCN folder: mapping.txt, predictions, posteriors and, where the true labels are
@@ -39,15 +42,18 @@ def predict(segmenter_folder: Path, source: Path, out: Path, *, jobs: int = 1) -
     if is_mstcn_folder(source):
         scores = _predict_folder(segmenter, MSTCNFolder.open(source), out)
     else:
-        scores = _predict_pool(segmenter, open_source(source), out, jobs)
+        scores = _predict_pool(segmenter, open_source(source), out, workers)
     if scores:
         write_json(out / METRICS_FILE, scores_json(scores))
     return scores
 
 
-def _predict_pool(segmenter: MSTCNSegmenter, pool: Source, out: Path, jobs: int) -> ScoresByPart:
+def _predict_pool(
+    segmenter: MSTCNSegmenter, pool: Source, out: Path, workers: Workers
+) -> ScoresByPart:
     require_sound(pool)
-    found = segmenter.segment(pool, jobs=jobs)
+    print_notes(pool)
+    found = segmenter.segment(pool, workers=workers)
     assert found.posteriors is not None
     scores = score_episodes(pool.episodes, found)
     logged = [episode.spans() for episode in pool.episodes]

@@ -7,28 +7,29 @@ from pathlib import Path
 from filtering.segmentation.clustering import AUTO, clustering, subtask_count
 from filtering.segmentation.segments import Segmentation, Segmenter
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
 from teasim.pool.source import Demonstration, Source
 
 
-def logged(source: Source, *, jobs: int = 1) -> Segmentation:
+def logged(source: Source, *, workers: Workers = IN_PROCESS) -> Segmentation:
     """Use the sub-task spans logged in the source.
 
     Raises:
         PoolError: a demonstration has no logged sub-task, or a span beyond its end.
     """
-    del jobs  # nothing to compute
+    del workers  # nothing to compute
     spans = [demo.spans() for demo in source.episodes]
     return Segmentation(_names(source, spans), _checked(source, spans, "logged"))
 
 
-def predictions(source: Source, *, jobs: int = 1) -> Segmentation:
+def predictions(source: Source, *, workers: Workers = IN_PROCESS) -> Segmentation:
     """Use the spans that a segmenter stored in the source, with its posteriors if all exist.
 
     Raises:
         PoolError: a demonstration has no stored span, or one beyond its end.
     """
-    del jobs  # nothing to compute
+    del workers  # nothing to compute
     spans = [demo.predicted_spans() for demo in source.episodes]
     checked = _checked(source, spans, "predictions")
     found = [demo.posteriors() for demo in source.episodes]

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
 from teasim.pool.source import Source
 from teasim.pool.types import runs
@@ -28,6 +29,8 @@ class Segmentation:
     a row is the probability of no sub-task. None where segments were given, not inferred."""
     labelled: frozenset[str] = frozenset()
     """demo_id of the demonstrations whose true labels the segmenter was fitted to."""
+    cameras: tuple[str, ...] = ()
+    """Cameras whose pictures were looked at; empty where segments were given."""
     weights_sha256: str | None = None
     """Hash of the weights of the segmenter; None where segments were given."""
 
@@ -59,8 +62,8 @@ def label_numbers(spans: Sequence[tuple[Span, ...]], subtasks: tuple[str, ...]) 
 class Segmenter(Protocol):
     """Finds the segments of every demonstration of a source."""
 
-    def __call__(self, source: Source, /, *, jobs: int = 1) -> Segmentation:
-        """Return them in the order of `source.episodes`; they do not depend on `jobs`."""
+    def __call__(self, source: Source, /, *, workers: Workers = IN_PROCESS) -> Segmentation:
+        """Return them in the order of `source.episodes`; they do not depend on `workers`."""
 
 
 def decode(

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -12,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.vision.cache import ArrayCache, default_folder
-from filtering.vision.frames import fit_size, uniform_indices
+from filtering.vision.frames import fitted_frames, uniform_indices
 from filtering.vision.pretrained import feature_recipe
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
+from teasim.common.workers import Workers
 from teasim.pool.source import Clip, Demonstration
 
 CHUNK = 64
@@ -54,6 +56,8 @@ class FrameTask:
 
     clip: Clip
     """Where the frames are."""
+    camera: str
+    """Name of the camera."""
     count: int
     """Number of frames to use."""
     cache_folder: Path
@@ -62,6 +66,10 @@ class FrameTask:
 
 class Cached(Protocol):
     """Work whose result is cached."""
+
+    @property
+    def camera(self) -> str:
+        """Name of the camera whose pictures are looked at."""
 
     @property
     def cache_folder(self) -> Path:
@@ -89,7 +97,7 @@ def moment_of_frames(length: int, count: int) -> NDArray[np.int64]:
 
 
 def frame_features(
-    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, jobs: int
+    episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, workers: Workers
 ) -> list[NDArray[np.float32]]:
     """Return per demonstration (n, F * cameras), n = sample_count(...).
 
@@ -97,7 +105,7 @@ def frame_features(
         episodes: the demonstrations.
         fps: frames per second of their videos.
         source: cameras and rate.
-        jobs: worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
@@ -105,13 +113,14 @@ def frame_features(
     tasks = [
         FrameTask(
             episode.clip(camera),
+            camera,
             sample_count(episode.length, fps, source.rate),
             default_folder(),
         )
         for episode in episodes
         for camera in source.cameras
     ]
-    described = look_up_or_describe(tasks, _key, describe_moments, jobs)
+    described = look_up_or_describe(tasks, _key, describe_moments, workers)
     return side_by_side(described, len(source.cameras))
 
 
@@ -119,19 +128,33 @@ def look_up_or_describe(
     tasks: Sequence[Task],
     key: Callable[[Task], str],
     describe: Callable[[Task], NDArray[np.float32]],
-    jobs: int,
+    workers: Workers,
 ) -> list[NDArray[np.float32]]:
-    """Return what `describe` gives for each task; workers start only for what is not cached."""
-    known = {n: ArrayCache(task.cache_folder).get(key(task)) for n, task in enumerate(tasks)}
-    unknown = [number for number, features in known.items() if features is None]
-    computed = parallel.run(
-        describe,
-        [tasks[number] for number in unknown],
-        jobs=jobs,
-        description="looking at videos",
-    )
-    known.update(zip(unknown, computed, strict=True))
+    """Return what `describe` gives for each task, camera by camera, and cache it.
+
+    Workers start only for what is not cached.
+    """
+    keys = [key(task) for task in tasks]
+    known = {n: ArrayCache(task.cache_folder).get(keys[n]) for n, task in enumerate(tasks)}
+    for camera in dict.fromkeys(task.camera for task in tasks):
+        unknown = [n for n, task in enumerate(tasks) if task.camera == camera and known[n] is None]
+        computed = parallel.run(
+            partial(_describe_and_keep, describe),
+            [(tasks[number], keys[number]) for number in unknown],
+            workers=workers,
+            description=f"looking at {camera}",
+        )
+        known.update(zip(unknown, computed, strict=True))
     return [features for features in known.values() if features is not None]
+
+
+def _describe_and_keep(
+    describe: Callable[[Task], NDArray[np.float32]], job: tuple[Task, str]
+) -> NDArray[np.float32]:
+    task, key = job
+    features = describe(task)
+    ArrayCache(task.cache_folder).put(key, features)
+    return features
 
 
 def side_by_side(videos: Sequence[NDArray[np.float32]], width: int) -> list[NDArray[np.float32]]:
@@ -140,10 +163,8 @@ def side_by_side(videos: Sequence[NDArray[np.float32]], width: int) -> list[NDAr
 
 
 def describe_moments(task: FrameTask) -> NDArray[np.float32]:
-    """Return the features (n, F) of the moments of `task`, and cache them."""
-    features = describe_clip(task.clip, sampled_frames(task.clip.length, task.count))
-    ArrayCache(task.cache_folder).put(_key(task), features)
-    return features
+    """Return the features (n, F) of the moments of `task`."""
+    return describe_clip(task.clip, sampled_frames(task.clip.length, task.count))
 
 
 def describe_clip(clip: Clip, wanted: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -151,9 +172,9 @@ def describe_clip(clip: Clip, wanted: NDArray[np.int64]) -> NDArray[np.float32]:
     from filtering.vision.backbone import describe_frames
 
     parts = []
-    stream = clip.stream(wanted)
+    stream = fitted_frames(clip, wanted)
     while images := list(islice(stream, CHUNK)):
-        parts.append(describe_frames(fit_size(np.stack(images))))
+        parts.append(describe_frames(np.concatenate(images)))
     return np.concatenate(parts)
 
 

@@ -1,11 +1,13 @@
 """Frames of a segment: which ones, and at what size (paper section 3.2)."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from teasim.common.errors import ConfigError
 from teasim.pool import Span
-from teasim.pool.source import Source
+from teasim.pool.source import Clip, Source
 
 LARGEST_SIDE = 224
 """Frames whose shorter side is longer are area-averaged down to it [pixels]; the backbone was
@@ -45,6 +47,12 @@ def fit_size(frames: Frames) -> Frames:
 
     size = (round(width * scale), round(height * scale))
     return np.stack([cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in frames])
+
+
+def fitted_frames(clip: Clip, indices: NDArray[np.int64]) -> Iterator[Frames]:
+    """Yield frames (1, H, W, 3) of a clip, which ascend, each shrunk before the next is decoded."""
+    for image in clip.stream(indices):
+        yield fit_size(image[None])
 
 
 def main_camera(pool: Source) -> str:

@@ -16,6 +16,7 @@ from policies.data.features import NO_MAPS, Maps, camera_maps, views
 from policies.data.samples import DecisionSamples, ObservationSpec
 from teasim.common import parallel
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Episode, Pool
 from teasim.pool.lerobot.layout import ENVIRONMENT_STATE, STATE
 
@@ -46,7 +47,7 @@ class DemosConfig:
 
 
 def load_decisions(
-    pool: Pool, config: DemosConfig | None = None, *, jobs: int = 1
+    pool: Pool, config: DemosConfig | None = None, *, workers: Workers = IN_PROCESS
 ) -> DecisionSamples:
     """Read the decisions of every demonstration of `pool`, in the order of the pool.
 
@@ -63,7 +64,7 @@ def load_decisions(
         raise PoolError(f"No demonstration of '{pool.root}' holds a sub-task.")
     read = partial(_read_demo, subtasks=pool.subtasks, spec=spec, config=config)
     episodes = [pool.episodes[place] for place in acting]
-    demos = parallel.run(read, episodes, jobs=jobs, description="decisions")
+    demos = parallel.run(read, episodes, workers=workers, description="decisions")
     maps, low_dim, labels = (np.concatenate(parts) for parts in zip(*demos, strict=True))
     places = np.repeat(acting, [len(labels) for _, _, labels in demos])
     return DecisionSamples(maps, low_dim, labels, places, spec, pool.subtasks)

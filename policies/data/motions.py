@@ -13,6 +13,7 @@ from policies.data.demos import column_names
 from policies.data.samples import Observation, ObservationSpec
 from teasim.common import parallel
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Episode, Pool
 from teasim.pool.lerobot.layout import ACTION, ENVIRONMENT_STATE, STATE
 
@@ -56,7 +57,9 @@ class MotionSamples:
         )
 
 
-def load_motions(pool: Pool, observe: str = "auto", *, jobs: int = 1) -> MotionSamples:
+def load_motions(
+    pool: Pool, observe: str = "auto", *, workers: Workers = IN_PROCESS
+) -> MotionSamples:
     """Read every control step of every demonstration of `pool`, in the order of the pool.
 
     Raises:
@@ -71,7 +74,7 @@ def load_motions(pool: Pool, observe: str = "auto", *, jobs: int = 1) -> MotionS
     names = tuple(pool.state_names or ()), column_names(pool, ENVIRONMENT_STATE)
     spec, action_names = ObservationSpec((), 0, 0, *names), column_names(pool, ACTION)
     read = partial(_read_demo, spec=spec)
-    demos = parallel.run(read, pool.episodes, jobs=jobs, description="motions")
+    demos = parallel.run(read, pool.episodes, workers=workers, description="motions")
     low_dim, targets = (np.concatenate(parts) for parts in zip(*demos, strict=True))
     places = np.repeat(np.arange(len(demos)), [len(steps) for _, steps in demos])
     try:

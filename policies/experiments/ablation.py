@@ -28,11 +28,12 @@ from policies.play.environments import World, worlds
 from policies.play.evaluation import MODES, Scores, play, score
 from policies.play.results import as_json
 from policies.play.rollout import Action, Episode
-from policies.settings import AblateSettings, EnvironmentConfig, job_count
+from policies.settings import AblateSettings, EnvironmentConfig
 from policies.training import places_of
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder, write_json, write_text
+from teasim.common.workers import Workers
 from teasim.pool import Pool
 from teasim.pool.weight_table import write_weight_table
 
@@ -65,14 +66,14 @@ def run_ablation(settings: AblateSettings) -> str:
         ConfigError: the configuration is unusable, or the output folder is in use.
         PoolError: a pool is missing or damaged.
     """
-    config, out, jobs = AblationConfig.read(settings.config), settings.out, job_count(settings.jobs)
-    parallel.check_workers(jobs, "loky")
+    config, out, workers = AblationConfig.read(settings.config), settings.out, settings.workers
     claim(config, out)
     report_resume(config, out)
-    runs = [run for path in config.pools for run in _runs(config, path, out, jobs)]
-    shares = [runs[first::jobs] for first in range(min(jobs, len(runs)))]
+    runs = [run for path in config.pools for run in _runs(config, path, out, workers)]
+    count = min(workers.count, len(runs))
+    shares = [runs[first::count] for first in range(count)]
     work = partial(_run_all, config=config, out=out)
-    parallel.run(work, shares, jobs=jobs, description="policies")
+    parallel.run(work, shares, workers=workers, description="policies")
     cells = {cell: _read(cell.path(out)) for cell in all_cells(config)}
     write_text(out / "results.csv", as_csv(cells))
     table = as_markdown(config, cells)
@@ -113,7 +114,9 @@ def all_cells(config: AblationConfig) -> list[Cell]:
     return [cell for pool in config.pools for cell in _cells_of(config, pool)]
 
 
-def chosen_weights(pool: Pool, variant: FilterVariant, out: Path, jobs: int) -> NDArray[np.float64]:
+def chosen_weights(
+    pool: Pool, variant: FilterVariant, out: Path, workers: Workers
+) -> NDArray[np.float64]:
     """Weight of every demonstration of `pool`, (D,); a filter is run once and its table kept.
 
     Raises:
@@ -126,7 +129,7 @@ def chosen_weights(pool: Pool, variant: FilterVariant, out: Path, jobs: int) -> 
     table = out / "filters" / f"{pool.root.name}--{variant.name}.csv"
     if not table.is_file():
         table.parent.mkdir(exist_ok=True)
-        write_weight_table(table, DemoFilter(variant.config).fit(pool, jobs=jobs).table())
+        write_weight_table(table, DemoFilter(variant.config).fit(pool, workers=workers).table())
     return demo_weights(pool, table, variant.use)
 
 
@@ -139,7 +142,7 @@ def _cells_of(config: AblationConfig, pool: Path) -> list[Cell]:
     ]
 
 
-def _runs(config: AblationConfig, path: Path, out: Path, jobs: int) -> list[Run]:
+def _runs(config: AblationConfig, path: Path, out: Path, workers: Workers) -> list[Run]:
     """Return the cells of the pool at `path` that have no scores yet."""
     cells = [cell for cell in _cells_of(config, path) if not cell.path(out).is_file()]
     if not cells:
@@ -147,11 +150,11 @@ def _runs(config: AblationConfig, path: Path, out: Path, jobs: int) -> list[Run]
     pool = Pool.open(path)
     wanted = {cell.filter for cell in cells}
     weights = {
-        variant.name: chosen_weights(pool, variant, out, jobs)
+        variant.name: chosen_weights(pool, variant, out, workers)
         for variant in config.filters
         if variant.name in wanted
     }
-    samples = load_decisions(pool, DemosConfig(observe=config.observe), jobs=jobs)
+    samples = load_decisions(pool, DemosConfig(observe=config.observe), workers=workers)
     experts = places_of(pool, config.expert)
     learners = {variant.name: variant for variant in config.learners}
     return [

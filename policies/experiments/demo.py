@@ -30,7 +30,7 @@ from policies.learners.subtask_policy import SubtaskPolicy
 from policies.play.evaluation import Scores, evaluate_all
 from policies.play.results import as_json
 from policies.play.results import summary as rates
-from policies.settings import DemoSettings, EvaluationConfig, job_count
+from policies.settings import DemoSettings, EvaluationConfig
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder, write_json
@@ -80,17 +80,17 @@ def run_demo(settings: DemoSettings) -> str:
     trial = EvaluationConfig(settings.episodes, environment=settings.environment)
     check_size(settings)
     check_new_folder(settings.out)
-    out, jobs, watch = settings.out, job_count(settings.jobs), Stopwatch()
-    pool = generate_pool(out / "pool", settings, jobs)
+    out, workers, watch = settings.out, settings.workers, Stopwatch()
+    pool = generate_pool(out / "pool", settings)
     watch.lap("generate")
     fitted = DemoFilter(FilterConfig(frames_per_segment=settings.frames_per_segment))
-    fitted.fit(pool, jobs=jobs)
+    fitted.fit(pool, workers=workers)
     write_filter_output(out / "filter", pool, fitted)
     watch.lap("filter")
     sets = training_sets(pool, out / "filter" / "weights.csv")
-    policies = train_policies(pool, sets, settings, jobs)
+    policies = train_policies(pool, sets, settings)
     watch.lap("train")
-    found = evaluate_all(list(policies.values()), trial, jobs=jobs)
+    found = evaluate_all(list(policies.values()), trial, workers=workers)
     scores = dict(zip(policies, found, strict=True))
     watch.lap("evaluate")
     result = DemoResult(
@@ -119,15 +119,16 @@ def check_size(settings: DemoSettings) -> None:
         )
 
 
-def generate_pool(path: Path, settings: DemoSettings, jobs: int) -> Pool:
+def generate_pool(path: Path, settings: DemoSettings) -> Pool:
     """Generate the pool with the verb `generate`: policies never import the simulator.
 
     Raises:
         TeasimError: the verb failed, in its own sentence.
     """
     (verb,) = entry_points(group="teasim.verbs", name="generate")
-    numbers = {"seq1": settings.seq1, "seq3": settings.seq3, "seed": settings.seed, "jobs": jobs}
-    options = [word for name, number in numbers.items() for word in (f"--{name}", str(number))]
+    given = {name: getattr(settings, name) for name in ("seq1", "seq3", "seed")}
+    given |= asdict(settings.workers)
+    options = [f"--{name}={value}" for name, value in given.items() if value is not None]
     verb.load()([str(path), *options])
     return Pool.open(path)
 
@@ -144,17 +145,19 @@ def training_sets(pool: Pool, table: Path) -> dict[str, NDArray[np.float64]]:
 
 
 def train_policies(
-    pool: Pool, sets: Mapping[str, NDArray[np.float64]], settings: DemoSettings, jobs: int
+    pool: Pool, sets: Mapping[str, NDArray[np.float64]], settings: DemoSettings
 ) -> dict[str, SubtaskPolicy]:
     """Clone behaviour from each of the training `sets` and save the policies.
 
     The policies are recurrent and see the state, so they differ by the demonstrations they learn
     from and not by what is visible in a picture.
     """
-    samples = load_decisions(pool, DemosConfig(observe="state"), jobs=jobs)
+    samples = load_decisions(pool, DemosConfig(observe="state"), workers=settings.workers)
     config = BCRNNConfig(seed=settings.seed)
     fit = partial(_fit, samples, config)
-    learned = parallel.run(fit, list(sets.values()), jobs=jobs, description="policies")
+    learned = parallel.run(
+        fit, list(sets.values()), workers=settings.workers, description="policies"
+    )
     policies = dict(zip(sets, learned, strict=True))
     for name, policy in policies.items():
         weights = sets[name].tolist()
@@ -174,7 +177,7 @@ def write_report(path: Path, pool: Pool, fitted: DemoFilter, result: DemoResult)
     """Write the filter's report with a section on the scores of the policies."""
     render_report(
         path,
-        demos=demo_views(pool, fitted),
+        demos=demo_views(pool, fitted, path.parent),
         threshold=fitted.threshold_,
         subtasks=fitted.segments_.subtasks,
         sections=[ReportSection("What that does to a policy", score_section(result.scores))],
@@ -183,7 +186,7 @@ def write_report(path: Path, pool: Pool, fitted: DemoFilter, result: DemoResult)
 
 def as_record(result: DemoResult, settings: DemoSettings) -> dict[str, Any]:
     """Return the settings and the result as JSON can hold them."""
-    config = {k: v for k, v in asdict(settings).items() if k not in ("out", "jobs")}
+    config = {k: v for k, v in asdict(settings).items() if k not in ("out", "workers")}
     return {
         "version": version("teasim"),
         "config": config,

@@ -20,6 +20,7 @@ from policies.play.rollout import Episode, run_episode
 from policies.settings import EvaluationConfig
 from teasim.common import parallel
 from teasim.common.statistics import Rate, grouped_rate
+from teasim.common.workers import IN_PROCESS, Workers
 
 MODES = ("deterministic", "sampled")
 """How decisions are made: the most probable sub-task, or one drawn from the probabilities."""
@@ -52,18 +53,20 @@ class SubtaskBatch:
     """Settings of the evaluation."""
 
 
-def evaluate(policy: Policy, config: EvaluationConfig, *, jobs: int = 1) -> dict[str, Scores]:
-    """Score `policy` in both modes; the result does not depend on `jobs`.
+def evaluate(
+    policy: Policy, config: EvaluationConfig, *, workers: Workers = IN_PROCESS
+) -> dict[str, Scores]:
+    """Score `policy` in both modes; the result does not depend on `workers`.
 
     Raises:
         CheckpointError: the policy was trained for another environment.
         ConfigError: the environment cannot be made.
     """
-    return evaluate_all([policy], config, jobs=jobs)[0]
+    return evaluate_all([policy], config, workers=workers)[0]
 
 
 def evaluate_all(
-    policies: Sequence[Policy], config: EvaluationConfig, *, jobs: int = 1
+    policies: Sequence[Policy], config: EvaluationConfig, *, workers: Workers = IN_PROCESS
 ) -> list[dict[str, Scores]]:
     """Score all `policies` in the same scenes; decisions they share are simulated once.
 
@@ -77,7 +80,7 @@ def evaluate_all(
         SubtaskBatch(tuple(policies), seeds, config)
         for seeds in batches(range(config.seed, config.seed + config.episodes))
     ]
-    parts = parallel.run(_play_batch, work, jobs=jobs, description="episodes")
+    parts = parallel.run(_play_batch, work, workers=workers, description="episodes")
     return [
         {
             mode: score(mode, [e for part in parts for e in part[n][mode]], policy.action_names)

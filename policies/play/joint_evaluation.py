@@ -18,6 +18,7 @@ from policies.play.outcomes import Outcomes, tally
 from policies.settings import EnvironmentConfig, EvaluationConfig
 from teasim.common import parallel
 from teasim.common.statistics import Rate, grouped_rate
+from teasim.common.workers import IN_PROCESS, Workers
 
 
 @dataclass(frozen=True)
@@ -57,9 +58,9 @@ class MotionBatch:
 
 
 def evaluate_motion(
-    policy: MotionPolicy, config: EvaluationConfig, *, jobs: int = 1
+    policy: MotionPolicy, config: EvaluationConfig, *, workers: Workers = IN_PROCESS
 ) -> dict[str, MotionScores]:
-    """Score `policy` in both modes; the result does not depend on `jobs`.
+    """Score `policy` in both modes; the result does not depend on `workers`.
 
     Raises:
         CheckpointError: the policy was trained for another environment.
@@ -71,7 +72,7 @@ def evaluate_motion(
         for mode in MODES
         for seeds in batches(_seeds(config, mode))
     ]
-    played = parallel.run(_play_batch, work, jobs=jobs, description="episodes")
+    played = parallel.run(_play_batch, work, workers=workers, description="episodes")
     pairs = list(zip(work, played, strict=True))
     return {
         mode: score_motion(mode, [e for batch, part in pairs if batch.mode == mode for e in part])

@@ -7,6 +7,7 @@ import numpy as np
 
 from scenes.scene import KINDS, Act, Plan, Scene, World, make_plan
 from teasim.common import parallel
+from teasim.common.workers import Workers
 from teasim.pool import EpisodeRecord, EpisodeWriter, MistakeSpan, Pool, PoolHeader, Span
 from teasim.pool import finalize_pool as finalize
 
@@ -25,7 +26,7 @@ PACE = 0.12
 """Standard deviation of the log of a person's pace, and of each step's and rest's."""
 
 
-def make_bank(root: Path, scene: Scene, *, seed: int, jobs: int) -> Pool:
+def make_bank(root: Path, scene: Scene, *, seed: int, workers: Workers) -> Pool:
     """Write the videos of a scene to `root`, unless they are there."""
     header = PoolHeader(
         fps=FPS,
@@ -42,7 +43,7 @@ def make_bank(root: Path, scene: Scene, *, seed: int, jobs: int) -> Pool:
         return Pool.open(root)
     kinds = [kind for kind in KINDS for _ in range(BANK[kind])]
     tasks = [(root, header, number, kind) for number, kind in enumerate(kinds)]
-    parallel.run(write_video, tasks, jobs=jobs, description=scene.name)
+    parallel.run(write_video, tasks, workers=workers, description=scene.name)
     return finalize(root, header, len(tasks))
 
 

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,6 +10,7 @@ import tyro
 
 from teasim.common.cli import parse, resumable
 from teasim.common.errors import Interrupted
+from teasim.common.workers import WorkerOptions, Workers
 
 if TYPE_CHECKING:
     from teasim.pool.writers.content import Choice
@@ -66,8 +67,8 @@ class ConvertSettings(ReadSettings):
     language: tyro.conf.FlagCreatePairsOff[bool] = False
     """Also write the sub-tasks of a LeRobot data set as sentences (language_persistent), which
     LeRobot trains on since version 0.6 and cannot open before it."""
-    jobs: int | None = None
-    """Number of worker processes; by default one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,8 @@ class LabelSettings(ReadSettings):
     """New folder or file for the copy."""
     to: Format | None = None
     """Format of the copy; by default that of the source."""
-    jobs: int | None = None
-    """Number of worker processes; by default one per core."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
 
 @resumable
@@ -138,7 +139,6 @@ def label(argv: Sequence[str] | None = None) -> int:
 def _write(
     settings: ConvertSettings | LabelSettings, writer: "Writer", choice: "Choice", dest: Path
 ) -> int:
-    from teasim.common.parallel import default_jobs
     from teasim.pool.readers.reader import ReadOptions
     from teasim.pool.readers.registry import open_source
     from teasim.pool.soundness import print_notes, require_sound
@@ -150,9 +150,8 @@ def _write(
     require_sound(source)
     print_notes(source)
     content = content_of(source, choice)
-    jobs = default_jobs() if settings.jobs is None else settings.jobs
     try:
-        notes = write(writer, source, content, dest, jobs=jobs)
+        notes = write(writer, source, content, dest, workers=settings.workers)
     except KeyboardInterrupt:
         raise Interrupted(
             f"Interrupted; {kept(dest)} of {len(content.items)} demonstrations are kept in "

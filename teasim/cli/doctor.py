@@ -14,7 +14,7 @@ import numpy as np
 import tyro
 
 from teasim.common.cli import parse
-from teasim.common.parallel import default_jobs
+from teasim.common.workers import default_jobs
 from teasim.gl import BACKENDS, FIXES, Probe, probe
 from teasim.pool.clips import VideoClip, VideoWriter, probe_codecs
 

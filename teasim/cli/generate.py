@@ -2,14 +2,14 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from teasim.common.cli import parse
-from teasim.common.parallel import default_jobs
+from teasim.common.workers import WorkerOptions, Workers
 from teasim.generation.config import GenerateConfig, PoolOptions
 
 EXAMPLES = (
@@ -30,10 +30,8 @@ class GenerateArguments:
     """A named set of pools. paper: the pools of the paper, 36 videos of people and 12 of YuMi, in
     two folders below PATH. Of the other settings, a preset uses only --camera, --size, --quality,
     --look and --seed."""
-    jobs: int | None = None
-    """Number of processes, by default one per core; the result does not depend on it."""
-    backend: str = "loky"
-    """Package that runs the processes: loky, dask or ray."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -42,11 +40,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     pools = _pools(arguments)
     from teasim.generation.making import generate
 
-    jobs = default_jobs() if arguments.jobs is None else arguments.jobs
     start = time.perf_counter()
     remade = count = 0
     for folder, config in pools.items():
-        made = generate(folder, config, jobs=jobs, backend=arguments.backend)
+        made = generate(folder, config, workers=arguments.workers)
         count, remade = count + len(made.pool.episodes), remade + made.remade
     seconds = time.perf_counter() - start
     print(

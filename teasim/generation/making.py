@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from teasim.common.parallel import check_workers, run
+from teasim.common.parallel import run
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.generation.config import GenerateConfig
 from teasim.generation.plan import plan_pool
 from teasim.generation.recording import generate_demo, pool_header
@@ -23,17 +24,16 @@ class Generated:
 
 
 def generate(
-    root: Path | str, config: GenerateConfig, *, jobs: int = 1, backend: str = "loky"
+    root: Path | str, config: GenerateConfig, *, workers: Workers = IN_PROCESS
 ) -> Generated:
-    """Make a pool in the folder `root`, in `jobs` processes; an unfinished pool is resumed.
+    """Make a pool in the folder `root`; an unfinished pool is resumed.
 
     Raises:
-        ConfigError: `jobs` is not positive, or `backend` is unknown.
+        ConfigError: no cluster answers at the address of the workers.
         PoolError: `root` is in use.
         GenerationError: a demonstration never came out as labelled.
         RenderError: no headless OpenGL back end works.
     """
-    check_workers(jobs, backend)
     if config.video:
         choose_gl()  # fails before anything is written if nothing can be rendered
     plans = plan_pool(config)
@@ -41,5 +41,5 @@ def generate(
     claim_folder(Path(root), header)
     waiting = [plan for plan in plans if not episode_is_done(root, plan.index, header)]
     make = partial(generate_demo, Path(root), config)
-    attempts = run(make, waiting, jobs=jobs, backend=backend, description="demonstrations")
+    attempts = run(make, waiting, workers=workers, description="demonstrations")
     return Generated(finalize_pool(root, header, len(plans)), sum(attempts) - len(attempts))

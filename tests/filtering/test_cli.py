@@ -97,6 +97,26 @@ def test_a_threshold_can_be_a_number(
     assert record["threshold"] == record["config"]["threshold"] == 0.45
 
 
+@pytest.mark.parametrize(
+    ("options", "seen"),
+    [
+        (["--segmenter", "logged", "--no-effects"], []),
+        (["--segmenter", "logged"], ["left", "cup"]),
+        (["--segmenter", "logged", "--camera", "left"], ["left"]),
+        (["--no-effects", "--segmenter", "clustering"], ["left"]),
+    ],
+)
+def test_the_cameras_that_were_looked_at_are_told(
+    toy_pool: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str], options, seen
+) -> None:
+    out = tmp_path / "out"
+    argv = [str(toy_pool.root), "-o", str(out), "--jobs", "1", "--score", "norm"]
+    assert main([*argv, *options]) == 0
+    told = ", ".join(seen) or "none"
+    assert f"cameras looked at: {told}\n" in capsys.readouterr().out
+    assert json.loads((out / "filter.json").read_text())["cameras_looked_at"] == seen
+
+
 def test_debug_shows_the_traceback(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     argv = ["filter", str(tmp_path), "-o", str(tmp_path / "out")]
     assert teasim(argv) == 2
@@ -112,7 +132,7 @@ def test_debug_shows_the_traceback(tmp_path: Path, capsys: pytest.CaptureFixture
 def test_a_page_that_cannot_be_made_loses_no_result(
     toy_pool: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch
 ) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise PoolError("The video 'x.mp4' is damaged.")
 
     monkeypatch.setattr("filtering.output.demo_views", broken)

@@ -15,6 +15,7 @@ from filtering.segmentation.clustering import AVERAGES, subtask_count
 from filtering.segmentation.segmenter import SEGMENTERS, segmenter_named
 from filtering.segmentation.segments import Segmentation
 from teasim.common.errors import ConfigError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Episode, Pool
 from tests.filtering.test_discovery import made_up
 from tests.toy_pool import make_toy_pool
@@ -44,9 +45,9 @@ def stored_features(monkeypatch: pytest.MonkeyPatch) -> None:
     """Demos bring their features with them."""
     real = module.frame_features
 
-    def of_demos(episodes, fps, source, *, jobs):
+    def of_demos(episodes, fps, source, *, workers):
         if isinstance(episodes[0], Episode):
-            return real(episodes, fps, source, jobs=jobs)
+            return real(episodes, fps, source, workers=workers)
         return [np.tile(demo.features, (1, len(source.cameras))) for demo in episodes]
 
     monkeypatch.setattr(module, "frame_features", of_demos)
@@ -101,7 +102,7 @@ def test_the_order_of_the_demonstrations_changes_no_bit(pool: Demos):
 def test_only_the_averages_of_the_named_cameras_are_compared(pool: Demos):
     episodes = pool.episodes[:2]
     one, two = (
-        module.looks(episodes, 10.0, module.FrameSource(cameras), jobs=1)  # type: ignore[arg-type]
+        module.looks(episodes, 10.0, module.FrameSource(cameras), workers=IN_PROCESS)  # type: ignore[arg-type]
         for cameras in (("front",), ("front", "side"))
     )
     assert one[0].shape == (len(episodes[0].features), AVERAGES)
@@ -174,6 +175,6 @@ def test_a_filter_without_labels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     found = DemoFilter(config).fit(Pool.open(pool.root))
     assert set(found.segments_.subtasks) <= {"step 1", "step 2", "step 3"}
     assert len(found.weights_) == 3
-    again = DemoFilter(config).fit(Pool.open(pool.root), jobs=2)
+    again = DemoFilter(config).fit(Pool.open(pool.root), workers=Workers(2))
     assert again.segments_.spans == found.segments_.spans
     assert again.table() == found.table()

@@ -12,6 +12,7 @@ from filtering.demo_filter import DemoFilter
 from filtering.judging.judges import JUDGES
 from filtering.segmentation.segmenter import segmenter_named
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.workers import Workers
 from teasim.pool import Pool
 from tests.filtering.conftest import TOY_SEQUENCES
 from tests.toy_pool import SEQ_1, make_toy_pool, strip_ground_truth, strip_labels
@@ -37,7 +38,7 @@ def test_weights_and_trust_are_shares(toy_filter: DemoFilter) -> None:
 
 
 def test_fitting_again_changes_nothing(toy_filter: DemoFilter, toy_pool: Pool) -> None:
-    again = DemoFilter(toy_filter.config).fit(toy_pool).fit(toy_pool, jobs=2)
+    again = DemoFilter(toy_filter.config).fit(toy_pool).fit(toy_pool, workers=Workers(2))
     assert again.table() == toy_filter.table()
 
 

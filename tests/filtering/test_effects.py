@@ -8,6 +8,7 @@ import pytest
 from filtering.effects.rests import changes, look_at_rests, rest_features, rest_moments
 from filtering.effects.surprise import effect_surprises
 from filtering.vision.frame_features import FrameSource, frame_features
+from teasim.common.workers import IN_PROCESS
 from teasim.pool import Pool, Span
 from tests.toy_pool import SEQ_1
 
@@ -94,8 +95,8 @@ def test_a_video_is_at_rest_at_the_borders_of_its_segments():
 def test_looking_at_rests_alone_sees_the_same(toy_pool: Pool):
     episodes, source = toy_pool.episodes[:1], FrameSource(("cup",))
     segments = [episode.spans() for episode in episodes]
-    seen = look_at_rests(episodes, segments, toy_pool.fps, source, jobs=1)
-    moments = frame_features(episodes, toy_pool.fps, source, jobs=1)
+    seen = look_at_rests(episodes, segments, toy_pool.fps, source, workers=IN_PROCESS)
+    moments = frame_features(episodes, toy_pool.fps, source, workers=IN_PROCESS)
     for rests, features, episode in zip(seen, moments, episodes, strict=True):
         full = rest_features(features, episode.length, episode.spans(), toy_pool.fps)
         np.testing.assert_allclose(rests, full, atol=1e-4)

@@ -22,6 +22,7 @@ from filtering.features.pictures import overlay
 from filtering.segmentation.config import FitConfig, MSTCNConfig
 from filtering.segmentation.fit import fit_segmenter
 from teasim.common.errors import CheckpointError, ConfigError
+from teasim.common.workers import IN_PROCESS
 from teasim.pool import Pool
 from tests.toy_pool import make_toy_pool
 
@@ -57,7 +58,7 @@ def test_a_segment_becomes_the_maximum_of_the_kept_channels(folder, toy_pool):
     episode = toy_pool.episodes[2]
     part = Pool.open(toy_pool.root)
     segments = [e.spans() for e in part.episodes]
-    described = learned.describe(part, segments, jobs=1)
+    described = learned.describe(part, segments, workers=IN_PROCESS)
     assert [rows.shape for rows in described] == [(len(spans), 32) for spans in segments]
     left_out = np.setdiff1d(np.arange(32), learned.generator.kept_)
     assert len(left_out) == 16

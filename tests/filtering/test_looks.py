@@ -14,6 +14,7 @@ from filtering.vision.background import GREY, subtraction_named
 from filtering.vision.cache import ArrayCache
 from filtering.vision.frames import fit_size, uniform_indices
 from teasim.common.errors import ConfigError
+from teasim.common.workers import Workers
 from teasim.pool import Pool
 
 
@@ -141,20 +142,20 @@ def test_features_do_not_depend_on_jobs_or_on_the_cache(
     segments = [episode.spans()[:2] for episode in toy_pool.episodes[:2]]
     toy = _First(toy_pool, 2)
 
-    def extract(jobs: int) -> list[np.ndarray]:
+    def extract(workers: Workers) -> list[np.ndarray]:
         return segment_features(
             toy,  # type: ignore[arg-type]
             segments,
             cameras=("left",),
             frames_per_segment=3,
             background="median",
-            jobs=jobs,
+            workers=workers,
         )
 
     monkeypatch.setenv("TEASIM_CACHE", str(tmp_path / "one"))
-    fresh, cached = extract(1), extract(1)
+    fresh, cached = extract(Workers(1)), extract(Workers(1))
     monkeypatch.setenv("TEASIM_CACHE", str(tmp_path / "two"))
-    for found in (cached, extract(2)):
+    for found in (cached, extract(Workers(2))):
         assert all(np.array_equal(a, b) for a, b in zip(fresh, found, strict=True))
 
 

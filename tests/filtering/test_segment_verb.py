@@ -17,6 +17,7 @@ from filtering.segmentation.predict import predict
 from filtering.segmentation.scoring import folder_pair, score_episodes
 from filtering.vision.frame_features import FrameSource, frame_features
 from teasim.common.errors import ConfigError, PoolError, TeasimError
+from teasim.common.workers import IN_PROCESS
 from teasim.pool import Episode, Pool, Span
 from teasim.pool.mstcn import MSTCNFolder, write_predictions
 from tests.filtering.conftest import TOY_SEQUENCES
@@ -116,7 +117,7 @@ def test_the_verb_fits_and_predicts(toy_pool, tmp_path, capsys):
 def test_predictions_from_stored_features(fitted, toy_pool: Pool, tmp_path):
     """Features exported from the pool give the pool's own segments."""
     source, names = FrameSource(toy_pool.cameras, 10.0), toy_pool.subtasks[::-1]
-    features = frame_features(toy_pool.episodes, toy_pool.fps, source, jobs=1)
+    features = frame_features(toy_pool.episodes, toy_pool.fps, source, workers=IN_PROCESS)
     found = load_segmenter(fitted[0]).segment(toy_pool)
     (tmp_path / "videos" / "features").mkdir(parents=True)
     truth = {}

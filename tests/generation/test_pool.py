@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from teasim.common.errors import GenerationError, PoolError, SkillError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.constants import SUBTASKS
 from teasim.generation import DemoPlan, GenerateConfig, generate, making, plan_pool, recording
 from teasim.generation.recording import ATTEMPTS, generate_demo
@@ -44,9 +45,9 @@ def digests(root: Path) -> dict[str, str]:
 @pytest.mark.slow
 def test_files_do_not_depend_on_workers_nor_on_interruptions(tmp_path, short):
     whole, parallel, resumed = (tmp_path / name for name in ("whole", "parallel", "resumed"))
-    made = generate(whole, SMALL, jobs=1)
+    made = generate(whole, SMALL, workers=IN_PROCESS)
     assert (len(made.pool.episodes), made.remade) == (2, 0)
-    generate(parallel, SMALL, jobs=2)
+    generate(parallel, SMALL, workers=Workers(2))
     assert digests(parallel) == digests(whole)
     generate_demo(resumed, SMALL, SHORT[1])
     left_over = digests(resumed)

@@ -14,6 +14,7 @@ from policies.cli import evaluate, train
 from policies.learners.registry import LEARNERS
 from policies.settings import EnvironmentConfig, TrainSettings
 from teasim.common.errors import CheckpointError, ConfigError, PoolError, TeasimError
+from teasim.common.workers import IN_PROCESS
 from teasim.pool.weight_table import WeightRow, write_weight_table
 from tests.policies.fakes import FAKE_ID
 from tests.policies.learning import AT_SUBTASKS
@@ -154,7 +155,7 @@ def test_the_help_names_every_learner(capsys):
 
 
 def test_python_trains_what_the_command_line_trains(fake_pool, run, tmp_path):
-    done = policies.train(TrainSettings(fake_pool.root, tmp_path / "run", jobs=1))
+    done = policies.train(TrainSettings(fake_pool.root, tmp_path / "run", workers=IN_PROCESS))
     assert str(done).startswith("bc on 7 of 7 demonstrations, 48 decisions, loss ")
     for name in ("policy.safetensors", "policy.json"):
         assert (tmp_path / "run" / name).read_bytes() == (run / name).read_bytes()

@@ -10,16 +10,17 @@ from policies.experiments import demo
 from policies.experiments.demo import ALL, KEPT, run_demo
 from policies.settings import DemoSettings, EnvironmentConfig
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.workers import IN_PROCESS
 from tests.policies.conftest import WITHOUT_TEA_BAG
 from tests.policies.fakes import FAKE_ID, SEQ_1, make_fake_pool
 
 
 def settings(out):
     world = EnvironmentConfig(FAKE_ID)
-    return DemoSettings(out=out, seq1=6, seq3=2, episodes=2, environment=world, jobs=1)
+    return DemoSettings(out=out, seq1=6, seq3=2, episodes=2, environment=world, workers=IN_PROCESS)
 
 
-def fake_generate(path, config, jobs):
+def fake_generate(path, config):
     sequences = [SEQ_1] * config.seq1 + [WITHOUT_TEA_BAG] * config.seq3
     return make_fake_pool(path, sequences, seed=config.seed)
 
@@ -103,7 +104,7 @@ def test_more_incorrect_demonstrations_than_correct_ones_are_refused(tmp_path):
 def test_a_failed_generation_says_its_own_sentence(tmp_path):
     (tmp_path / "pool").write_text("in the way")
     with pytest.raises(PoolError) as error:
-        demo.generate_pool(tmp_path / "pool", settings(tmp_path), 1)
+        demo.generate_pool(tmp_path / "pool", settings(tmp_path))
     assert str(error.value) == (
         f"'{tmp_path / 'pool'}' is a file; choose a folder that is new or empty."
     )

@@ -7,6 +7,7 @@ from policies.data.demos import DemosConfig, load_decisions
 from policies.data.features import camera_maps
 from policies.data.samples import ObservationSpec
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.workers import Workers
 from teasim.constants import STATE_NAMES, SUBTASKS
 from tests.policies.fakes import FLAGS
 from tests.toy_pool import SEQ_1, make_toy_pool
@@ -33,13 +34,13 @@ def test_the_first_view_is_the_frame_at_the_start_of_the_span(fake_pool, decisio
 
 
 def test_altered_views_depend_on_seed_and_demonstration_alone(fake_pool, decisions):
-    again = load_decisions(fake_pool, DemosConfig(copies=1, seed=1), jobs=2)
+    again = load_decisions(fake_pool, DemosConfig(copies=1, seed=1), workers=Workers(2))
     np.testing.assert_array_equal(decisions.maps[:, 0], again.maps[:, 0])
     assert (decisions.maps[:, 1] != again.maps[:, 1]).any(axis=(1, 2, 3, 4)).all()
 
 
 def test_the_number_of_workers_changes_nothing(fake_pool, decisions):
-    again = load_decisions(fake_pool, DemosConfig(copies=1), jobs=2)
+    again = load_decisions(fake_pool, DemosConfig(copies=1), workers=Workers(2))
     np.testing.assert_array_equal(decisions.maps, again.maps)
     np.testing.assert_array_equal(decisions.labels, again.labels)
 

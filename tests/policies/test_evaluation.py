@@ -12,6 +12,7 @@ from policies.play.video import STRIP, caption
 from policies.settings import EnvironmentConfig, EvaluationConfig
 from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.statistics import rate
+from teasim.common.workers import Workers
 from teasim.constants import STATE_NAMES
 from teasim.pool.clips import VideoClip, check_decodable
 from tests.policies.fakes import FAKE_WORLD, FLAGS, SEQ_1, SUBTASKS, ScriptedPolicy
@@ -61,7 +62,9 @@ def test_the_interval_counts_episodes_not_repeated_errors():
 
 
 def test_workers_change_nothing():
-    assert evaluate(ScriptedPolicy(), config(5), jobs=2) == evaluate(ScriptedPolicy(), config(5))
+    assert evaluate(ScriptedPolicy(), config(5), workers=Workers(2)) == evaluate(
+        ScriptedPolicy(), config(5)
+    )
 
 
 def test_every_action_is_told_from_the_reference():

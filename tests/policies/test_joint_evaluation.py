@@ -15,6 +15,7 @@ from policies.play.results import motion_summary
 from policies.settings import EvaluationConfig
 from teasim.common.errors import CheckpointError, ConfigError
 from teasim.common.statistics import rate
+from teasim.common.workers import Workers
 from teasim.constants import SUBTASKS
 from tests.policies.fake_joints import FAKE_JOINTS, FAKE_JOINTS_ID
 from tests.policies.fakes import SEQ_1
@@ -59,7 +60,7 @@ def test_where_nothing_moves_the_typical_episode_is_played_once(run, capsys):
 def test_workers_change_nothing(run):
     policy = load_policy(run)
     config = EvaluationConfig(5, environment=FAKE_JOINTS)
-    assert evaluate_motion(policy, config, jobs=2) == evaluate_motion(policy, config)
+    assert evaluate_motion(policy, config, workers=Workers(2)) == evaluate_motion(policy, config)
 
 
 class Still:

@@ -7,12 +7,13 @@ from policies.cli import train
 from policies.data.motions import load_motions, one_sign, seen_numbers
 from teasim.cli.main import main
 from teasim.common.errors import ConfigError
+from teasim.common.workers import Workers
 from teasim.constants import STATE_NAMES
 from tests.policies.fakes import FLAGS
 
 
 def test_every_control_step_of_a_pool(joint_pool):
-    samples = load_motions(joint_pool, jobs=2)
+    samples = load_motions(joint_pool, workers=Workers(2))
     lengths = [7 * steps for steps in (4, 5, 6, 7)]
     np.testing.assert_array_equal(np.bincount(samples.demos), lengths)
     assert samples.spec.state_names == STATE_NAMES == samples.action_names

@@ -13,6 +13,7 @@ from policies.play.environments import make_environment
 from policies.play.evaluation import evaluate, evaluate_all
 from policies.play.remembering import Remembering, can_remember
 from policies.settings import EnvironmentConfig, EvaluationConfig
+from teasim.common.workers import Workers
 from tests.policies.fakes import FAKE_WORLD, SEQ_1, FakeTea, ScriptedPolicy
 
 
@@ -111,4 +112,6 @@ def test_the_tea_station_can_be_remembered():
 def test_several_policies_score_as_they_do_alone():
     others = ScriptedPolicy(), ScriptedPolicy((0, 4, 4, 2, 3, 6, 1, 5))
     config = EvaluationConfig(5, environment=FAKE_WORLD)
-    assert evaluate_all(others, config, jobs=2) == [evaluate(each, config) for each in others]
+    assert evaluate_all(others, config, workers=Workers(2)) == [
+        evaluate(each, config) for each in others
+    ]

@@ -11,6 +11,7 @@ import pytest
 
 from teasim.common.errors import ConfigError, TeasimError
 from teasim.common.lock import locked
+from teasim.common.workers import Workers
 from teasim.pool.readers.registry import open_source
 from teasim.pool.source import Source
 from teasim.pool.writers import writing
@@ -52,7 +53,7 @@ def test_the_result_depends_neither_on_jobs_nor_on_time(toy_pool: Source, to: st
     suffix = ".hdf5" if WRITERS[to].suffixes else ""
     content = content_of(toy_pool, Choice())
     for name, jobs in (("one", 1), ("two", 2)):
-        write(WRITERS[to], toy_pool, content, tmp_path / f"{name}{suffix}", jobs=jobs)
+        write(WRITERS[to], toy_pool, content, tmp_path / f"{name}{suffix}", workers=Workers(jobs))
     assert hashes(tmp_path / f"one{suffix}") == hashes(tmp_path / f"two{suffix}")
 
 

@@ -133,6 +133,27 @@ def test_notes_are_printed_as_warnings(
     assert all(line.startswith("teasim: warning: ") for line in lines)
 
 
+def test_every_verb_prints_the_notes(
+    sound: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise TeasimError("Far enough.")
+
+    root = Path(shutil.copytree(sound, tmp_path / "copy"))
+    rewrite_log(root, lambda table: table.slice(1), EPISODES)
+    for work in ("demo_filter.DemoFilter.fit", "segmentation.fit.chosen_cameras"):
+        monkeypatch.setattr(f"filtering.{work}", stop)
+    monkeypatch.setattr("policies.training.demo_weights", stop)
+    found = outcomes(root, tmp_path / "out")
+    assert [*found.values()] == [0, *["Far enough."] * 3]  # `inspect` comes first
+    notes, printed = open_source(root).notes, capsys.readouterr().err
+    assert notes
+    assert all(printed.count(f"teasim: warning: {note}\n") == len(found) for note in notes)
+
+
 def test_a_damaged_label_file_is_a_problem_of_a_folder_of_labels(tmp_path: Path) -> None:
     (tmp_path / "groundTruth").mkdir()
     (tmp_path / "mapping.txt").write_text("0 cut\n1 mix\n")

@@ -9,6 +9,7 @@ import pytest
 
 from teasim.common.errors import PoolError
 from teasim.common.parallel import run
+from teasim.common.workers import Workers
 from teasim.pool import (
     EpisodeRecord,
     EpisodeWriter,
@@ -55,7 +56,7 @@ def test_files_do_not_depend_on_workers_or_order(tmp_path: Path, backwards: bool
     for index in (1, 0) if backwards else (0, 1):
         write_one(tmp_path / "one", HEADER, index)
     finalize_pool(tmp_path / "one", HEADER, 2)
-    run(partial(write_one, tmp_path / "two", HEADER), range(2), jobs=2)
+    run(partial(write_one, tmp_path / "two", HEADER), range(2), workers=Workers(2))
     finalize_pool(tmp_path / "two", HEADER, 2)
     assert digests(tmp_path / "one") == digests(tmp_path / "two")
 

@@ -24,6 +24,7 @@ MARKDOWN = [
     "docs/results.md",
     "docs/ci.md",
     "docs/policies.md",
+    "docs/data.md",
 ]
 SCRIPTS = ["scripts/setup", "scripts/test", "scripts/demo", ".ci/run"]
 TEXTS = {".py", ".md", ".toml", ".xml", ".html", ".j2", ".css", ".js", ".yml", ".yaml", ".lock", ""}

@@ -18,6 +18,7 @@ from filtering.vision.frame_features import (
 )
 from filtering.vision.frames import frame_rate
 from teasim.common.errors import ConfigError
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
 from teasim.pool.source import Demonstration, Source
 
@@ -39,17 +40,17 @@ class MSTCNSegmenter:
     labelled: frozenset[str]
     """demo_id of the demonstrations it was fitted to."""
 
-    def segment(self, pool: Source, *, jobs: int = 1) -> Segmentation:
+    def segment(self, pool: Source, *, workers: Workers = IN_PROCESS) -> Segmentation:
         """Return the segments of every demonstration; true labels are not read.
 
         Raises:
             ConfigError: the pool lacks a camera that the segmenter was fitted to.
             PoolError: a video is missing or damaged.
         """
-        return self.segment_episodes(pool, pool.episodes, jobs=jobs)
+        return self.segment_episodes(pool, pool.episodes, workers=workers)
 
     def segment_episodes(
-        self, pool: Source, episodes: Sequence[Demonstration], *, jobs: int = 1
+        self, pool: Source, episodes: Sequence[Demonstration], *, workers: Workers = IN_PROCESS
     ) -> Segmentation:
         """Return the segments of some demonstrations of a pool; see `segment`."""
         missing = [camera for camera in self.source.cameras if camera not in pool.cameras]
@@ -58,7 +59,7 @@ class MSTCNSegmenter:
                 f"The segmenter was fitted to the camera '{missing[0]}', which the pool "
                 f"'{pool.root}' lacks; it has {', '.join(pool.cameras) or 'none'}."
             )
-        features = frame_features(episodes, frame_rate(pool), self.source, jobs=jobs)
+        features = frame_features(episodes, frame_rate(pool), self.source, workers=workers)
         rate = self.source.rate_in(frame_rate(pool))
         shortest = [max(1, round(seconds * rate)) for seconds in self.shortest]
         described = [
@@ -70,6 +71,7 @@ class MSTCNSegmenter:
             spans=tuple(spans for spans, _ in described),
             posteriors=tuple(posteriors for _, posteriors in described),
             labelled=self.labelled,
+            cameras=self.source.cameras,
             weights_sha256=hashlib.sha256(self.weights()).hexdigest(),
         )
 

@@ -17,10 +17,12 @@ from teasim.common.errors import PoolError
 # No B-frames and a key frame every 10: presentation order is file order, and readers that jump to
 # a frame decode ten at most. bitexact keeps the encoder's version out of the file.
 ENCODER = [
-    *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast", "-crf", "20"),
+    *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast"),
     *("-g", "10", "-bf", "0", "-sc_threshold", "0", "-threads", "1"),
     *("-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"),
 ]
+QUALITY = 20
+"""Constant rate factor of stored videos; ffmpeg's default, 23, blurs small objects."""
 
 
 class VideoWriter:
@@ -29,8 +31,17 @@ class VideoWriter:
     That format needs even sizes: of an odd one the last row or column is repeated.
     """
 
-    def __init__(self, path: Path, *, height: int, width: int, fps: float) -> None:
+    def __init__(
+        self, path: Path, *, height: int, width: int, fps: float, quality: int = QUALITY
+    ) -> None:
         """Start the encoder for frames of `height` x `width` pixels.
+
+        Args:
+            path: The file to write.
+            height: Height of the frames [pixels].
+            width: Width of the frames [pixels].
+            fps: Frames per second.
+            quality: Constant rate factor of libx264, 0 (lossless) to 51.
 
         Raises:
             PoolError: ffmpeg cannot be started.
@@ -42,7 +53,9 @@ class VideoWriter:
         size = f"{width + width % 2}x{height + height % 2}"
         rate = str(Fraction(fps).limit_denominator(1001))
         source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", rate, "-i", "-"]
-        self._process = _start_ffmpeg([*source, *ENCODER, str(path)], self._messages)
+        self._process = _start_ffmpeg(
+            [*source, *ENCODER, "-crf", str(quality), str(path)], self._messages
+        )
 
     def add(self, image: np.ndarray) -> None:
         """Append an (H, W, 3) uint8 RGB image.

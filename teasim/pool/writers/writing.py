@@ -16,6 +16,7 @@ from teasim.common import parallel
 from teasim.common.errors import ConfigError, TeasimError
 from teasim.common.files import check_new_folder, sync, write_text
 from teasim.common.lock import locked
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.source import Source
 from teasim.pool.writers.content import Content, Item
 from teasim.pool.writers.writer import Writer
@@ -25,7 +26,7 @@ PLAN, ASSEMBLED = "plan", "assembled"
 
 
 def write(
-    writer: Writer, source: Source, content: Content, dest: Path, *, jobs: int = 1
+    writer: Writer, source: Source, content: Content, dest: Path, *, workers: Workers = IN_PROCESS
 ) -> tuple[str, ...]:
     """Write `content` of `source` to `dest`; an unfinished one of the same content is continued.
 
@@ -34,7 +35,7 @@ def write(
         source: where the content is from; it is not modified.
         content: what is written.
         dest: a path where nothing is, or an empty folder.
-        jobs: number of worker processes; the result does not depend on it.
+        workers: where the work runs; the result does not depend on it.
 
     Returns:
         Sentences on what came out otherwise than one may expect.
@@ -49,7 +50,7 @@ def write(
     with _refusal(dest, len(content.items)):
         dest.parent.mkdir(parents=True, exist_ok=True)
         with locked(dest):
-            notes = _write(writer, content, dest, content.fingerprint(source), jobs)
+            notes = _write(writer, content, dest, content.fingerprint(source), workers)
     return notes
 
 
@@ -63,7 +64,9 @@ def kept(dest: Path) -> int:
     return sum(path.name.isdecimal() for path in staging_of(dest).glob("*"))
 
 
-def _write(writer: Writer, content: Content, dest: Path, plan: str, jobs: int) -> tuple[str, ...]:
+def _write(
+    writer: Writer, content: Content, dest: Path, plan: str, workers: Workers
+) -> tuple[str, ...]:
     staging = staging_of(dest)
     told = f"{writer.name} {plan}\n"
     if (staging / ASSEMBLED).exists() and dest.exists() and _plan_of(staging) == told:
@@ -73,7 +76,7 @@ def _write(writer: Writer, content: Content, dest: Path, plan: str, jobs: int) -
     check_new_folder(dest)
     _claim(staging, told)
     stage = partial(_stage, writer, content.common(), staging)
-    parallel.run(stage, content.items, jobs=jobs, description="demonstrations")
+    parallel.run(stage, content.items, workers=workers, description="demonstrations")
     whole = staging / f"whole{dest.suffix if writer.suffixes else ''}"
     _remove(whole)
     folders = [_folder(staging, item) for item in content.items]
