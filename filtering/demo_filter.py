@@ -62,7 +62,7 @@ class DemoFilter:
         >>> from pathlib import Path
         >>> import numpy as np
         >>> from filtering import DemoFilter, FilterConfig
-        >>> from teasim.pool.mstcn import write_predictions
+        >>> from teasim.pool.mstcn.folder import write_predictions
         >>> from teasim.pool.readers.registry import open_source
         >>> folder = Path(tempfile.mkdtemp())
         >>> usual, short = np.repeat([0, 1, 2], 5), np.repeat([0, 2], 5)
@@ -186,7 +186,7 @@ from the whole video.
         # Imported here because step lists need neither torch nor videos.
         from filtering.judging.moments import Timeline, judge_moments
         from filtering.moments.score import look
-        from filtering.segmentation.agreed import agreed_segments
+        from filtering.segmentation.unlabelled.agreed import agreed_segments
 
         self._seen.update(self.cameras_)
         with self._timed("features"):

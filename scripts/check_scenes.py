@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scenes.parts.writing import make_bank
 from scenes.registry import HELD_BACK, SCENES, TUNED_ON
 from scenes.scene import MISTAKES
-from scenes.writing import make_bank
 
 from filtering.moments.score import MomentScore, look, score_moments
 from filtering.moments.vectors import Video

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from filtering.segmentation.clustering import RATE, looks, subtask_count
-from filtering.segmentation.discovery import Discovery, discover
+from filtering.segmentation.unlabelled.clustering import RATE, looks, subtask_count
+from filtering.segmentation.unlabelled.discovery import Discovery, discover
 from filtering.vision.frame_features import FrameSource, sampled_frames
 from filtering.vision.frames import main_camera
 from teasim.common.workers import IN_PROCESS

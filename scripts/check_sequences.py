@@ -21,7 +21,7 @@ from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.steps import StepList, count_steps, steps_of_frames
 from filtering.judging.thresholds import probability_incorrect
 from teasim.common.statistics import auroc
-from teasim.pool.mstcn import MSTCNFolder
+from teasim.pool.mstcn.folder import MSTCNFolder
 
 DRESSING = ("add_oil", "add_vinegar", "add_salt", "add_pepper", "mix_dressing")
 """What the paper removes from salads that begin with it (section 4.2)."""

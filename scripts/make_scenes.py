@@ -5,8 +5,8 @@ import sys
 import time
 from pathlib import Path
 
+from scenes.parts.writing import make_bank
 from scenes.registry import SCENES
-from scenes.writing import make_bank
 
 from teasim.common.workers import Workers
 

@@ -11,7 +11,7 @@ from filtering.segmentation.scoring import UNSEEN, ScoresByPart, score_episodes,
 from filtering.segmentation.segments import decode
 from teasim.common.files import check_new_folder, write_json
 from teasim.common.workers import IN_PROCESS, Workers
-from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
+from teasim.pool.mstcn.folder import MSTCNFolder, is_mstcn_folder, write_predictions
 from teasim.pool.readers.registry import open_source
 from teasim.pool.soundness import print_notes, require_sound
 from teasim.pool.source import Source

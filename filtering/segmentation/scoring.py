@@ -15,7 +15,7 @@ from filtering.segmentation.metrics import (
 )
 from filtering.segmentation.segments import Segmentation
 from teasim.common.errors import PoolError
-from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder
+from teasim.pool.mstcn.folder import PREDICTIONS, TRUTH, MSTCNFolder
 from teasim.pool.source import Demonstration
 from teasim.pool.types import index_from_spans
 

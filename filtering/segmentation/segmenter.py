@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from filtering.segmentation.clustering import AUTO, clustering, subtask_count
 from filtering.segmentation.segments import Segmentation, Segmenter
+from filtering.segmentation.unlabelled.clustering import AUTO, clustering, subtask_count
 from teasim.common.errors import ConfigError, PoolError
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span

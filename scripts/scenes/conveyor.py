@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.drawing import Canvas, Film, Look, smooth
+from scenes.parts.drawing import Canvas, Film, Look, smooth
 from scenes.scene import Scene
 
 STATIONS = {"fill": 34.0, "cap": 62.0, "label": 90.0, "stamp": 118.0, "crate": 146.0, "spray": 76.0}

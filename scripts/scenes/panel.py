@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.drawing import Canvas, Film, Look, along, smooth, table
+from scenes.parts.drawing import Canvas, Film, Look, along, smooth, table
 from scenes.scene import Scene
 
 AWAY = np.array([80.0, 150.0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.drawing import Canvas, Film, Look, along, table
+from scenes.parts.drawing import Canvas, Film, Look, along, table
 from scenes.scene import Scene
 
 BACKGROUND = table(120, 160, (175, 165, 150), 4)

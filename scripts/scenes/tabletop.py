@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from scenes.drawing import Look, along
-from scenes.gantry import HOME, Gantry
+from scenes.parts.drawing import Look, along
+from scenes.parts.gantry import HOME, Gantry
 from scenes.scene import Scene
 
 THINGS = """

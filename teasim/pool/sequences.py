@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teasim.common.errors import PoolError
-from teasim.pool.mstcn import PREDICTIONS, TRUTH, MSTCNFolder
-from teasim.pool.mstcn_labels import BACKGROUNDS
+from teasim.pool.mstcn.folder import PREDICTIONS, TRUTH, MSTCNFolder
+from teasim.pool.mstcn.labels import BACKGROUNDS
 from teasim.pool.source import Clip
 from teasim.pool.types import Span, spans_from_index
 

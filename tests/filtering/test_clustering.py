@@ -10,10 +10,10 @@ import pytest
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
-from filtering.segmentation import clustering as module
-from filtering.segmentation.clustering import AVERAGES, subtask_count
 from filtering.segmentation.segmenter import SEGMENTERS, segmenter_named
 from filtering.segmentation.segments import Segmentation
+from filtering.segmentation.unlabelled import clustering as module
+from filtering.segmentation.unlabelled.clustering import AVERAGES, subtask_count
 from teasim.common.errors import ConfigError
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Episode, Pool

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from filtering.segmentation.discovery import (
+from filtering.segmentation.unlabelled.discovery import (
     MOST_STAGES,
     MOST_SUBTASKS,
     Discovery,
     discover,
     stage_count,
 )
-from filtering.segmentation.twfinch import partition
+from filtering.segmentation.unlabelled.twfinch import partition
 from teasim.pool.types import runs
 
 FEATURES = 16

@@ -7,7 +7,7 @@ import pytest
 
 from filtering.segmentation.scoring import folder_pair
 from teasim.common.errors import PoolError
-from teasim.pool.mstcn import MSTCNFolder, is_mstcn_folder, write_predictions
+from teasim.pool.mstcn.folder import MSTCNFolder, is_mstcn_folder, write_predictions
 from tests.filtering.conftest import real_data
 
 

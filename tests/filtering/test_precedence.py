@@ -13,7 +13,7 @@ from filtering.judging.norm.norm_score import score_steps
 from filtering.judging.norm.precedence import precedence_graph, read_precedence
 from filtering.judging.norm.steps import StepList, count_steps
 from teasim.common.errors import ConfigError
-from teasim.pool.mstcn import write_predictions
+from teasim.pool.mstcn.folder import write_predictions
 from teasim.pool.sequences import SequencePool
 from tests.toy_pool import SEQ_1
 

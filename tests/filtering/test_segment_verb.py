@@ -19,7 +19,7 @@ from filtering.vision.frame_features import FrameSource, frame_features
 from teasim.common.errors import ConfigError, PoolError, TeasimError
 from teasim.common.workers import IN_PROCESS
 from teasim.pool import Episode, Pool, Span
-from teasim.pool.mstcn import MSTCNFolder, write_predictions
+from teasim.pool.mstcn.folder import MSTCNFolder, write_predictions
 from tests.filtering.conftest import TOY_SEQUENCES
 from tests.toy_pool import SEQ_1, make_toy_pool
 

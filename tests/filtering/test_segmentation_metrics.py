@@ -17,7 +17,7 @@ from filtering.segmentation.metrics import (
     subtask_accuracy,
 )
 from filtering.segmentation.scoring import folder_pair
-from teasim.pool.mstcn import MSTCNFolder
+from teasim.pool.mstcn.folder import MSTCNFolder
 from tests.filtering.conftest import real_data
 
 

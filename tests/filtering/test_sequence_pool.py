@@ -17,7 +17,7 @@ from filtering.segmentation.segmenter import segmenter_named
 from teasim.cli.main import main
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool, Span
-from teasim.pool.mstcn import write_predictions
+from teasim.pool.mstcn.folder import write_predictions
 from teasim.pool.readers.registry import open_source
 from teasim.pool.sequences import SequencePool, joined_spans
 from teasim.pool.weight_table import read_weight_table

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from teasim.common.errors import TeasimError
-from teasim.pool.mstcn import MSTCNFolder
+from teasim.pool.mstcn.folder import MSTCNFolder
 from teasim.pool.readers.registry import open_source
 from tests.pool import foreign_inputs as made
 

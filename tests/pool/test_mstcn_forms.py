@@ -7,9 +7,9 @@ import pytest
 
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Span
-from teasim.pool.mstcn import MSTCNFolder
-from teasim.pool.mstcn_arrays import layout_of
-from teasim.pool.mstcn_labels import BACKGROUNDS, read_labels, read_mapping, video_name
+from teasim.pool.mstcn.arrays import layout_of
+from teasim.pool.mstcn.folder import MSTCNFolder
+from teasim.pool.mstcn.labels import BACKGROUNDS, read_labels, read_mapping, video_name
 from teasim.pool.readers.reader import ReadOptions
 from teasim.pool.readers.registry import open_source
 from teasim.pool.sequences import SequencePool

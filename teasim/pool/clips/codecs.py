@@ -24,6 +24,7 @@ ENCODERS: Mapping[str, tuple[str, Mapping[str, str]]] = MappingProxyType(
 """Per codec the encoder that makes the video it is tried with, and the encoder's options."""
 
 N_FRAMES = 5
+"""Frames of the clip that every codec encodes and decodes."""
 SIDE = 64  # pixels; libsvtav1 makes nothing smaller
 LARGEST_ERROR = 20.0  # grey levels of 255, of single grey frames
 STEP = 40  # grey levels between two frames

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from teasim.common.errors import PoolError
 from teasim.pool.clips.hdf5 import opened
-from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash, root_names
-from teasim.pool.hdf5_logs import logs_of
+from teasim.pool.hdf5.logs import logs_of
+from teasim.pool.hdf5.pictures import arrays, clips_in, files_in, group, logs_hash, root_names
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.readers.videos import natural
 from teasim.pool.recordings import RecordedSource, Recording, unreadable

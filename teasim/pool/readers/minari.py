@@ -9,9 +9,9 @@ from typing import Any
 
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool.clips.hdf5 import opened
-from teasim.pool.hdf5 import arrays, clips_in, group, logs_hash
-from teasim.pool.hdf5_facts import read_facts
-from teasim.pool.hdf5_logs import StoredLog, logs_of, observation_logs
+from teasim.pool.hdf5.facts import read_facts
+from teasim.pool.hdf5.logs import StoredLog, logs_of, observation_logs
+from teasim.pool.hdf5.pictures import arrays, clips_in, group, logs_hash
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.recordings import RecordedSource, Recording, unreadable
 

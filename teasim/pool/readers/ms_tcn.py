@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from teasim.common.errors import ConfigError
-from teasim.pool.mstcn import is_mstcn_folder
-from teasim.pool.mstcn_labels import BACKGROUNDS
+from teasim.pool.mstcn.folder import is_mstcn_folder
+from teasim.pool.mstcn.labels import BACKGROUNDS
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.sequences import SequencePool
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool.clips.hdf5 import library, opened
-from teasim.pool.hdf5 import arrays, clips_in, files_in, group, logs_hash
-from teasim.pool.hdf5_facts import read_facts
-from teasim.pool.hdf5_logs import StoredLog, logs_of, observation_logs
+from teasim.pool.hdf5.facts import read_facts
+from teasim.pool.hdf5.logs import StoredLog, logs_of, observation_logs
+from teasim.pool.hdf5.pictures import arrays, clips_in, files_in, group, logs_hash
 from teasim.pool.readers import aloha, minari
 from teasim.pool.readers.reader import Reader, ReadOptions
 from teasim.pool.recordings import RecordedSource, Recording, unreadable

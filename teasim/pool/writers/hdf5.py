@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from teasim.pool.clips.hdf5 import library
-from teasim.pool.hdf5_facts import ATTRIBUTE, Facts
-from teasim.pool.hdf5_logs import NAMES
+from teasim.pool.hdf5.facts import ATTRIBUTE, Facts
+from teasim.pool.hdf5.logs import NAMES
 from teasim.pool.writers.content import Content, Item
 
 STAGED = "demo.hdf5"

@@ -9,7 +9,7 @@ import numpy as np
 
 from teasim.common.errors import ConfigError
 from teasim.common.files import write_json
-from teasim.pool.hdf5_logs import FILLED
+from teasim.pool.hdf5.logs import FILLED
 from teasim.pool.readers.minari import MAIN, METADATA, RATE
 from teasim.pool.types import index_from_spans
 from teasim.pool.writers.content import Content, Item

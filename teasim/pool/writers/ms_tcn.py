@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from teasim.common.errors import ConfigError
-from teasim.pool.mstcn import write_predictions
-from teasim.pool.mstcn_arrays import read_array, write_array
-from teasim.pool.mstcn_labels import BACKGROUNDS
+from teasim.pool.mstcn.arrays import read_array, write_array
+from teasim.pool.mstcn.folder import write_predictions
+from teasim.pool.mstcn.labels import BACKGROUNDS
 from teasim.pool.types import NO_SUBTASK, index_from_spans
 from teasim.pool.weight_table import WeightRow, write_weight_table
 from teasim.pool.writers.content import Content, Item

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from teasim.pool.hdf5_logs import FILLED, NAMES
+from teasim.pool.hdf5.logs import FILLED, NAMES
 from teasim.pool.readers.robomimic import ACTION_OFFSET, ACTION_SCALE
 from teasim.pool.writers.content import Content, Item
 from teasim.pool.writers.hdf5 import (

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.segmentation.stage_model import (
+from filtering.segmentation.unlabelled.stage_model import (
     NOWHERE,
     StageModel,
     States,
@@ -22,7 +22,7 @@ from filtering.segmentation.stage_model import (
     one_to_one,
     probabilities,
 )
-from filtering.segmentation.twfinch import partition
+from filtering.segmentation.unlabelled.twfinch import partition
 from teasim.common.arrays import Array
 from teasim.pool.types import runs
 

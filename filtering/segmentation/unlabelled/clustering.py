@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.segmentation.discovery import discover
 from filtering.segmentation.scaling import scaled
 from filtering.segmentation.segments import Segmentation, spans_of
+from filtering.segmentation.unlabelled.discovery import discover
 from filtering.vision.frame_features import FrameSource, frame_features, moment_of_frames
 from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError

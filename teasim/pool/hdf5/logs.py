@@ -10,7 +10,7 @@ import numpy as np
 
 from teasim.common.errors import PoolError
 from teasim.pool.clips.hdf5 import opened
-from teasim.pool.hdf5 import arrays, checked, is_pictures
+from teasim.pool.hdf5.pictures import arrays, checked, is_pictures
 
 WIDEST = 4096
 """Most dimensions of a log; wider arrays are maps or point clouds, not what a log records."""

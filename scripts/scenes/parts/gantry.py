@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from scenes.drawing import Film, Look, along
+from scenes.parts.drawing import Film, Look, along
 from teasim.gl import choose_gl
 
 HOME = np.array([0.0, -0.05, 0.42])

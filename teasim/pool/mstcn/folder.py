@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from teasim.common.errors import PoolError
 from teasim.common.files import write_text
-from teasim.pool.mstcn_arrays import Layout, feature_shape, layout_of, read_array, write_array
-from teasim.pool.mstcn_labels import (
+from teasim.pool.mstcn.arrays import Layout, feature_shape, layout_of, read_array, write_array
+from teasim.pool.mstcn.labels import (
     BACKGROUND,
     COMMENT,
     LABEL_SUFFIXES,

@@ -1,0 +1,1 @@
+"""What the scenes have in common: drawing, a gantry, writing pools."""

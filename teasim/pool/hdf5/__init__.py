@@ -1,0 +1,1 @@
+"""What HDF5 files of other tools hold: pictures, logs of numbers, facts."""

@@ -1,0 +1,1 @@
+"""The folder format of MS-TCN: labels per frame, features, predictions."""
