@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from teasim.cli.main import main as teasim
 from tests.toy_pool import SEQ_1, make_toy_pool
 
 ROOT = Path(__file__).parents[2]
@@ -128,6 +129,18 @@ def test_the_readmes_python_runs(block, tmp_path):
         assert done.stdout.startswith("True ")  # tea is made by correct actions
     else:
         assert len(done.stdout.splitlines()) == 4
+
+
+@pytest.mark.slow
+def test_every_line_of_your_own_videos_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    make_toy_pool("recording", [SEQ_1] * 5 + [SEQ_1[1:]], size=32, frames_per_subtask=6)
+    assert teasim(["convert", "recording", "films", "--to", "videos", "--jobs", "1"]) == 0
+    section = README.split("## Your own videos")[1].split("## ")[0]
+    (block,) = re.findall(r"```bash\n(.*?)```", section, flags=re.DOTALL)
+    for line in block.splitlines():
+        program, *arguments = shlex.split(line, comments=True)
+        assert (program, teasim(arguments)) == ("teasim", 0), line + capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
