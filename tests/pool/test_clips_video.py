@@ -23,6 +23,7 @@ from tests import barcode
 
 N = 30
 NTSC = Fraction(30000, 1001)
+ONE_THREAD = {"preset": "12", "svtav1-params": "lp=1"}
 QUIET = "log-level=none:"
 B_FRAMES = {"g": "12", "bf": "3"}
 
@@ -75,8 +76,14 @@ LAYOUTS: dict[str, dict[str, Any]] = {
         "pix_fmt": "gray12le",
         "options": {"x265-params": QUIET},
     },
-    "av1.mp4": {"codec": "libsvtav1", "options": {"g": "2", "preset": "12"}},
-    "av1_long_gop.mp4": {"codec": "libsvtav1", "options": {"g": "100", "preset": "12"}},
+    "av1.mp4": {
+        "codec": "libsvtav1",
+        "options": {"g": "2", "preset": "12", "svtav1-params": "lp=1"},
+    },
+    "av1_long_gop.mp4": {
+        "codec": "libsvtav1",
+        "options": {"g": "100", "preset": "12", "svtav1-params": "lp=1"},
+    },
     "vp9.webm": {"codec": "libvpx-vp9", "options": {"g": "10", "deadline": "realtime"}},
     "vp9_hidden_frames.mp4": {
         "codec": "libvpx-vp9",
