@@ -51,12 +51,14 @@ LEAST_CHANGE = 12.0
 """Least usual change of a cell that counts, 0..255."""
 NOISE = 20.0
 """Added to the usual change of a cell: small changes cannot be lacking altogether, 0..255."""
-FLOOR = 0.1
+LEAST_SHARE = 0.1
 """Least share of a change that is told apart from none."""
 MOST_CELLS = 300
 """Most cells looked at at a moment, those that change most."""
 CELLS = 4
 """The mean of so many cells that lack most counts: a thing fills as many."""
+LASTING = 3
+"""Moments that were looked at, one after the other, at which something must be lacking."""
 MOMENTS = 3
 """The mean of so many moments counts."""
 BRIGHTNESS = 110.0
@@ -103,9 +105,10 @@ class View:
         It is a logarithm of shares, 0 where a video shows what is usual.
         """
         shares = np.stack([_share_lacking(amounts, trusted) for amounts in self.amounts])
-        # What is lacked at one moment alone is a hand that passed.
-        lasting = np.minimum(shares, np.concatenate([shares[1:], shares[-1:]]))
-        lacks = -np.log(1 + FLOOR - np.clip(lasting, 0.0, 1.0))
+        # What is lacked for less is a hand that passed, or a counterpart a little off.
+        padded = np.pad(shares, ((0, LASTING - 1), (0, 0)), mode="edge")
+        lasting = np.min([padded[k : k + len(shares)] for k in range(LASTING)], axis=0)
+        lacks = -np.log(1 + LEAST_SHARE - np.clip(lasting, 0.0, 1.0))
         return np.asarray(
             lacks - np.quantile(lacks[:, trusted], 1 - VARIETY, axis=1, keepdims=True)
         )
