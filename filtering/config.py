@@ -33,7 +33,7 @@ class FilterConfig(JudgingConfig):
     """Source of the segments: agreement (what the counterparts of the score moments agree on),
     clustering (the videos alone, without labels), logged (sub-tasks logged in the pool),
     predictions (stored in an MS-TCN folder), or a folder that `teasim segment fit` made. Only
-    logged reads logged labels. auto: the videos alone; for step lists without videos the stored
+    logged reads logged labels. auto: clustering; for step lists without videos the stored
     predictions, or else the logged labels."""
     subtasks: str = "auto"
     """Number of sub-tasks for the segmenter clustering; auto infers it."""
@@ -68,14 +68,13 @@ class FilterConfig(JudgingConfig):
     def for_source(self, source: Source) -> "FilterConfig":
         """Return these settings with `auto` replaced by what it stands for in a source.
 
-        Videos are judged by moments unless a setting is about segments; step lists without videos
-        by the score norm, from the predictions that are stored or else from the logged labels.
+        Videos are judged by the score norm on sub-tasks that clustering finds in them; step lists
+        without videos on the predictions that are stored, or else on the logged labels. Moments
+        rank better in other tasks than tea, but accuse too many correct videos (docs/results.md).
         """
-        about_segments = self.precedence or self.tolerance or self.subtasks != AUTO
         score, segmenter = self.score, self.segmenter
         if score == AUTO:
-            by_moments = segmenter in (AUTO, AGREEMENT) and source.cameras and not about_segments
-            score = MOMENTS if by_moments else "norm"
+            score = MOMENTS if segmenter == AGREEMENT else "norm"
         if segmenter == AUTO and score == MOMENTS:
             segmenter = AGREEMENT
         elif segmenter == AUTO and source.cameras:

@@ -2,7 +2,8 @@
 
 The truth is read for counting only. Scenes that are kept back are judged with --held-back alone,
 when everything has been chosen. A folder that make_scenes.py did not write is made first. Pools of
-mistakes have 10 usual videos and 3 of one kind of mistake; clean and free-order pools 12 videos.
+mistakes have 10 usual videos and some of one kind of mistake; clean and free-order pools 12 videos.
+With --tea pools of tea-making are judged too, with --scenes and no name after it they alone.
 """
 
 import argparse
@@ -25,8 +26,8 @@ from teasim.common.workers import Workers
 from teasim.pool import Pool
 from teasim.pool.lerobot import Episode
 
-GOOD, BAD, CLEAN = 10, 3, 12
-"""Usual and incorrect videos of a pool with mistakes, and videos of a pool without."""
+GOOD, CLEAN = 10, 12
+"""Usual videos of a pool with mistakes, and videos of a pool without."""
 NEAR = 1.5
 """How far a place that is named may lie from the true one [s]."""
 TEA_KINDS = {"seq_1": "usual", "legal": "free", "seq_2": "out_of_order", "seq_3": "missing"}
@@ -59,22 +60,28 @@ class Drawn(NamedTuple):
     bad: np.ndarray
     """(D,) True for incorrect ones."""
 
+    @property
+    def label(self) -> str:
+        """What the pool is made of."""
+        return f"{self.kind} {GOOD}+{self.bad.sum()}" if self.bad.any() else self.kind
+
 
 def main() -> int:
     """Run the check."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="where the videos of the scenes are")
     parser.add_argument("--held-back", action="store_true", help="judge the scenes kept back")
-    parser.add_argument("--scenes", nargs="+", help="names of scenes, in place of all tuned on")
+    parser.add_argument("--scenes", nargs="*", help="names of scenes, in place of all tuned on")
     parser.add_argument("--tea", type=Path, nargs="*", default=[], help="pools of tea-making")
     parser.add_argument("--cameras", nargs="+", help="cameras of tea-making; default: all")
     parser.add_argument("--pools", type=int, default=4, help="pools per scene and kind")
+    parser.add_argument("--bad", type=int, nargs="+", default=[3], help="incorrect ones per pool")
     parser.add_argument("--share", type=float, default=1.0, help="share of the videos drawn from")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
     arguments = parser.parse_args()
     chosen = [s.name for s in (HELD_BACK if arguments.held_back else TUNED_ON)]
-    print(f"{'scene':10}{'kind':14}{'AUROC':>7}{'found':>8}{'accused':>9}{'silent':>8}{'place':>7}")
+    print(f"{'scene':10}{'kind':18}{'AUROC':>7}{'found':>8}{'accused':>9}{'silent':>8}{'place':>7}")
     for name in arguments.scenes if arguments.scenes is not None else chosen:
         pool = make_bank(
             arguments.folder / name, SCENES[name], seed=0, workers=Workers(arguments.jobs)
@@ -111,9 +118,9 @@ def kind_of(record) -> str:
 def judge(bank: Bank, arguments: argparse.Namespace) -> None:
     """Print one line per kind of pool."""
     rows: dict[str, list[dict[str, float]]] = {}
-    for drawn in draw(bank.kinds, arguments.pools, arguments.seed):
+    for drawn in draw(bank.kinds, arguments):
         part = {c: [seen[v] for v in drawn.videos] for c, seen in bank.seen.items()}
-        rows.setdefault(drawn.kind, []).append(count(bank, drawn, score_moments(part)))
+        rows.setdefault(drawn.label, []).append(count(bank, drawn, score_moments(part)))
     for kind, counted in rows.items():
         mean = {key: _mean([row[key] for row in counted]) for key in counted[0]}
         if kind in ("usual", "free"):
@@ -123,33 +130,34 @@ def judge(bank: Bank, arguments: argparse.Namespace) -> None:
                 f"{mean['auroc']:>7.3f}{mean['found']:>8.2f}{mean['accused']:>9.2f}{'':8}"
                 f"{mean['place']:>7.2f}"
             )
-        print(f"{bank.name:10}{kind:14}{line}", flush=True)
+        print(f"{bank.name:10}{kind:18}{line}", flush=True)
 
 
-def draw(kinds: np.ndarray, pools: int, seed: int) -> Iterator[Drawn]:
+def draw(kinds: np.ndarray, arguments: argparse.Namespace) -> Iterator[Drawn]:
     """Draw pools of every kind there are videos of."""
-    rng = np.random.default_rng(seed)
-    for kind in (*MISTAKES, "usual", "free"):
+    rng = np.random.default_rng(arguments.seed)
+    usual = np.flatnonzero(kinds == "usual")
+    for kind in MISTAKES:
         those = np.flatnonzero(kinds == kind)
-        if len(those) < (BAD if kind in MISTAKES else CLEAN // 2):
-            continue
-        for _ in range(pools):
-            if kind in MISTAKES:
-                good = rng.permutation(np.flatnonzero(kinds == "usual"))[:GOOD]
-                videos = [*good, *rng.permutation(those)[:BAD]]
-            else:
-                videos = [*rng.permutation(those)[:CLEAN]]
-            yield Drawn(
-                kind,
-                videos,
-                kinds[videos] == kind if kind in MISTAKES else np.zeros(len(videos), dtype=bool),
-            )
+        for bad in (number for number in arguments.bad if number <= len(those)):
+            for _ in range(arguments.pools):
+                videos = [*rng.permutation(usual)[:GOOD], *rng.permutation(those)[:bad]]
+                yield Drawn(kind, videos, kinds[videos] == kind)
+    for kind in ("usual", "free"):
+        those = np.flatnonzero(kinds == kind)
+        for _ in range(arguments.pools if len(those) >= CLEAN // 2 else 0):
+            videos = [*rng.permutation(those)[:CLEAN]]
+            yield Drawn(kind, videos, np.zeros(len(videos), dtype=bool))
 
 
 def count(bank: Bank, drawn: Drawn, score: MomentScore) -> dict[str, float]:
     """Return what is right about the judgement of one pool."""
     bad, flagged = drawn.bad, score.flagged
-    right = [_place_is_right(bank, drawn, score, d) for d in np.flatnonzero(bad & flagged)]
+    right = [
+        _place_is_right(bank, drawn, score, d)
+        for d in np.flatnonzero(bad & flagged)
+        if bank.episodes[drawn.videos[d]].record.mistakes
+    ]
     return {
         "auroc": auroc(score.losses, bad) if bad.any() else np.nan,
         "found": flagged[bad].mean() if bad.any() else np.nan,

@@ -7,27 +7,31 @@ what usually changes here. A video has of it
 
     p_k = max over the neighbourhood of the cell of <x_k, m> / |m|,
 
-in a neighbourhood because no camera stands where another stood, and lacks
+in a neighbourhood because no camera stands where another stood. With q the median of p over the
+trusted videos, the share that is not there is
 
-    (q - p_k) / sqrt(s^2 + NOISE^2 + (SHARE q)^2),       q the quantile VARIETY of p, s its MAD,
+    (q - p_k) / (q + NOISE),
 
-which is about 1 / SHARE where nothing came of it and near 0 where it is as usual. Only changes that
-most videos show in the same cells count: what is carried from a place of its own to a common place
-is missed there. Windows of moments say where to look, so any order of steps will do.
+1 where nothing came of it and near 0 where it is as usual. Its mean over the cells that lack most
+becomes the logarithm of the share that is there; what the quantile 1 - VARIETY of the trusted
+videos lack at the same moment, because hands cover it or things lie elsewhere, is taken off. Only
+changes that most videos show in the same cells count: what is carried from a place of its own to a
+common place is missed there. Windows of moments say where to look, so any order of steps will do.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts
-from filtering.moments.evidence import VARIETY, Evidence, Stretch
+from filtering.moments.evidence import VARIETY, Evidence, Stretch, Trusted
 from filtering.moments.vectors import Video
 
 Array = NDArray[np.float64]
+Amounts = NDArray[np.float32]
+"""(..., C) how much of a usual change is there, 0..255."""
 States = NDArray[np.float16]
 """(n, H, W, 3) what lies where, hands and arms taken out."""
 
@@ -45,14 +49,16 @@ NEIGHBOURHOOD = 2
 """How far a thing may lie from where it usually does [cells]."""
 LEAST_CHANGE = 12.0
 """Least usual change of a cell that counts, 0..255."""
-NOISE = 5.0
-"""Scatter of a change that is always allowed for, 0..255."""
-SHARE = 0.15
-"""The same in proportion to the change."""
+NOISE = 20.0
+"""Added to the usual change of a cell: small changes cannot be lacking altogether, 0..255."""
+LEAST_SHARE = 0.1
+"""Least share of a change that is told apart from none."""
 MOST_CELLS = 300
 """Most cells looked at at a moment, those that change most."""
 CELLS = 4
 """The mean of so many cells that lack most counts: a thing fills as many."""
+LASTING = 3
+"""Moments that were looked at, one after the other, at which something must be lacking."""
 MOMENTS = 3
 """The mean of so many moments counts."""
 BRIGHTNESS = 110.0
@@ -71,33 +77,67 @@ class Usual:
     """(C,) their columns."""
     directions: Array
     """(C, 3) colour direction in which each changes, of length 1."""
-    amounts: Array
-    """(C,) how much it changes in most videos."""
-    scatters: Array
-    """(C,) how much the amount scatters."""
 
-    def lack(self, change: Array) -> float:
-        """Return how much of the usual change a change (H, W, 3) lacks."""
-        seen = _amounts(change, self.rows, self.columns, self.directions)
-        lacks = (self.amounts - seen) / self.scatters
-        return float(np.sort(lacks)[-CELLS:].mean())
+    def amounts(self, change: Array) -> Amounts:
+        """Return (C,): how much of it a change (H, W, 3) shows."""
+        reach = range(-NEIGHBOURHOOD, NEIGHBOURHOOD + 1)
+        height, width = change.shape[:2]
+        near_rows = np.clip(self.rows + np.repeat(reach, len(reach))[:, None], 0, height - 1)
+        near_columns = np.clip(self.columns + np.tile(reach, len(reach))[:, None], 0, width - 1)
+        near = change[near_rows, near_columns] * self.directions
+        return np.asarray(near.sum(axis=2).max(axis=0), dtype=np.float32)
 
 
-class _View(NamedTuple):
-    """What is usual from the viewpoint of one reference."""
+@dataclass(frozen=True)
+class View:
+    """What usually changes from the viewpoint of one reference, and how much in each video."""
 
     row: int
     """Row of the reference."""
-    usual: list[Usual]
-    """What usually changes, in order of time."""
+    usual: tuple[Usual, ...]
+    """What usually changes, in order of time; one or more."""
+    amounts: tuple[Amounts, ...]
+    """(D, C) of each: how much of it each of D videos shows."""
+
+    def lacks(self, trusted: Trusted) -> Array:
+        """Return (T, D): how much less each video shows of each change than trusted ones do.
+
+        It is a logarithm of shares, 0 where a video shows what is usual.
+        """
+        shares = np.stack([_share_lacking(amounts, trusted) for amounts in self.amounts])
+        # What is lacked for less is a hand that passed, or a counterpart a little off.
+        padded = np.pad(shares, ((0, LASTING - 1), (0, 0)), mode="edge")
+        lasting = np.min([padded[k : k + len(shares)] for k in range(LASTING)], axis=0)
+        lacks = -np.log(1 + LEAST_SHARE - np.clip(lasting, 0.0, 1.0))
+        return np.asarray(
+            lacks - np.quantile(lacks[:, trusted], 1 - VARIETY, axis=1, keepdims=True)
+        )
 
 
-def ineffective(found: Counterparts, videos: Sequence[Video]) -> Evidence:
+def ineffective(found: Counterparts, views: Sequence[View], trusted: Trusted) -> Evidence:
     """Return the evidence that nothing came of a step of each demonstration."""
-    views = _views(found, videos)
-    results = [_lacking(found, views, d, states_of(video)) for d, video in enumerate(videos)]
+    lacks = [view.lacks(trusted) for view in views]
+    results = [_lacking(found, views, lacks, d) for d in range(len(found.lengths))]
     values, own, other = zip(*results, strict=True)
     return Evidence(np.array(values), tuple(own), tuple(other))
+
+
+def observe(found: Counterparts, videos: Sequence[Video]) -> list[View]:
+    """Return what usually changes, seen from the most central references."""
+    states = {r: states_of(videos[r]) for r in found.references}
+    usual = {row: _usual_changes(found, row, states) for row in _central(found)}
+    amounts: dict[int, list[list[Amounts]]] = {row: [] for row in usual}
+    for d, video in enumerate(videos):
+        own = states[d] if d in states else states_of(video)
+        for row, changes in usual.items():
+            amounts[row].append(
+                [u.amounts(change_at(own, _place(found, row, d, u.moment))) for u in changes]
+            )
+    return [
+        View(row, tuple(changes), tuple(map(np.stack, zip(*amounts[row], strict=True))))
+        for row, changes in usual.items()
+        if changes
+    ]
 
 
 def states_of(video: Video) -> States:
@@ -127,26 +167,24 @@ def usual_change(moment: int, changes: Array) -> Usual | None:
     if len(flat) < CELLS:
         return None
     rows, columns = np.unravel_index(flat, sizes.shape)
-    directions = median[rows, columns] / sizes[rows, columns][:, None]
-    seen = np.stack([_amounts(change, rows, columns, directions) for change in changes])
-    amounts = np.quantile(seen, VARIETY, axis=0)
-    mad = 1.4826 * np.median(np.abs(seen - np.median(seen, axis=0)), axis=0)
-    scatters = np.sqrt(mad**2 + NOISE**2 + (SHARE * amounts) ** 2)
-    return Usual(moment, rows, columns, directions, amounts, scatters)
+    return Usual(moment, rows, columns, median[rows, columns] / sizes[rows, columns][:, None])
 
 
-def _views(found: Counterparts, videos: Sequence[Video]) -> list[_View]:
-    states = {r: states_of(videos[r]) for r in found.references}
-    views = []
-    for row in _central(found):
-        usual = []
-        for moment in range(0, found.lengths[found.references[row]], STRIDE):
-            changes = [change_at(states[k], _place(found, row, k, moment)) for k in states]
-            known = usual_change(moment, np.stack(changes))
-            if known is not None:
-                usual.append(known)
-        views.append(_View(row, usual))
-    return views
+def _usual_changes(found: Counterparts, row: int, states: Mapping[int, States]) -> list[Usual]:
+    usual = []
+    for moment in range(0, found.lengths[found.references[row]], STRIDE):
+        changes = [change_at(own, _place(found, row, k, moment)) for k, own in states.items()]
+        known = usual_change(moment, np.stack(changes))
+        if known is not None:
+            usual.append(known)
+    return usual
+
+
+def _share_lacking(amounts: Amounts, trusted: Trusted) -> Array:
+    """Return (D,): share of a usual change that is not there, in the cells that lack most."""
+    usual = np.median(amounts[trusted], axis=0)
+    lacking = (usual - amounts) / (np.maximum(usual, 0.0) + NOISE)
+    return np.asarray(np.sort(lacking, axis=1)[:, -CELLS:].mean(axis=1))
 
 
 def _central(found: Counterparts) -> list[int]:
@@ -159,22 +197,17 @@ def _central(found: Counterparts) -> list[int]:
 
 
 def _lacking(
-    found: Counterparts, views: Sequence[_View], d: int, states: States
+    found: Counterparts, views: Sequence[View], lacks: Sequence[Array], d: int
 ) -> tuple[float, Stretch, Stretch]:
     values, places = [], []
-    for view in views:
+    for view, lack in zip(views, lacks, strict=True):
         r = found.references[view.row]
-        if r == d or not view.usual:
+        if r == d:
             continue
-        at = [_place(found, view.row, d, usual.moment) for usual in view.usual]
-        lacks = np.array(
-            [u.lack(change_at(states, place)) for u, place in zip(view.usual, at, strict=True)]
-        )
-        # What is lacked at one moment alone is a hand that passed.
-        lasting = np.minimum(lacks, np.append(lacks[1:], lacks[-1:]))
-        values.append(float(np.sort(lasting)[-MOMENTS:].mean()))
-        worst = int(lasting.argmax())
-        places.append((_about(found, d, at[worst]), _about(found, r, view.usual[worst].moment)))
+        values.append(float(np.sort(lack[:, d])[-MOMENTS:].mean()))
+        moment = view.usual[int(lack[:, d].argmax())].moment
+        at = _place(found, view.row, d, moment)
+        places.append((_about(found, d, at), _about(found, r, moment)))
     if not values:
         nowhere = Stretch(d, 0, found.lengths[d])
         return 0.0, nowhere, nowhere
@@ -189,14 +222,3 @@ def _place(found: Counterparts, row: int, d: int, moment: int) -> int:
 
 def _about(found: Counterparts, video: int, moment: int) -> Stretch:
     return Stretch(video, max(moment - REACH, 0), min(moment + REACH + 1, found.lengths[video]))
-
-
-def _amounts(
-    change: Array, rows: NDArray[np.int64], columns: NDArray[np.int64], directions: Array
-) -> Array:
-    """Return (C,): the most of the change in each direction that lies near its cell."""
-    reach = range(-NEIGHBOURHOOD, NEIGHBOURHOOD + 1)
-    height, width = change.shape[:2]
-    near_rows = np.clip(rows + np.repeat(reach, len(reach))[:, None], 0, height - 1)
-    near_columns = np.clip(columns + np.tile(reach, len(reach))[:, None], 0, width - 1)
-    return np.asarray((change[near_rows, near_columns] * directions).sum(axis=2).max(axis=0))

@@ -1,7 +1,7 @@
 """What counterparts say against a demonstration: a stretch is missing, out of order or extra.
 
 With near_rd(t) the distance of the counterpart in video d of moment t of reference r, at_rd(t) its
-place, and Q_k the quantile 1 - VARIETY over the other references k:
+place, and Q_k the quantile 1 - VARIETY over the other references k, trusted ones alone:
 
     missing    log near_rd(t) - Q_k log near_rk(t)
     order      |at_rd(t) - m(t)| / (Q_k |at_rk(t) - m(t)| + 0.02)      m(t) = median_k at_rk(t)
@@ -23,9 +23,11 @@ from numpy.typing import NDArray
 from filtering.moments.counterparts import Counterparts
 
 Array = NDArray[np.float64]
+Trusted = NDArray[np.bool_]
+"""(D,) True for the demonstrations that say what is usual."""
 
 VARIETY = 0.3
-"""Share of the videos of a pool that makes a behaviour one of several usual ones."""
+"""Share of the trusted videos that makes a behaviour one of several usual ones."""
 WORST = 12
 """The worst 1 / WORST of a video counts."""
 FOUND = float(np.log(1.3))
@@ -60,9 +62,9 @@ class Evidence:
     """Per demonstration where in another video that which it is about is seen."""
 
 
-def missing_and_order(found: Counterparts) -> tuple[Evidence, Evidence]:
-    """Return the evidence that stretches of the references are missing, or out of order."""
-    curves = [_Reference(found, row) for row in range(len(found.references))]
+def missing_and_order(found: Counterparts, trusted: Trusted) -> tuple[Evidence, Evidence]:
+    """Return the evidence that stretches of the trusted references are missing, or out of order."""
+    curves = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
     missing, order = [], []
     for d in range(len(found.lengths)):
         rows = [c for c in curves if c.number != d]
@@ -72,12 +74,12 @@ def missing_and_order(found: Counterparts) -> tuple[Evidence, Evidence]:
     return _evidence(missing), _evidence(order)
 
 
-def extra(found: Counterparts) -> Evidence:
-    """Return the evidence that stretches of a demonstration are in no reference."""
-    usual = [_Reference(found, row).usual for row in range(len(found.references))]
+def extra(found: Counterparts, trusted: Trusted) -> Evidence:
+    """Return the evidence that stretches of a demonstration are in no trusted reference."""
+    usual = {row: _Reference(found, row, trusted).usual for row in rows_of(found, trusted)}
     results = []
     for d in range(len(found.lengths)):
-        rows = [row for row, r in enumerate(found.references) if r != d]
+        rows = [row for row in usual if found.references[row] != d]
         matches = [found.back[row][d] for row in rows]
         curves = np.stack(
             [
@@ -95,6 +97,12 @@ def extra(found: Counterparts) -> Evidence:
         other = Stretch(found.references[rows[nearest]], int(places.min()), int(places.max()) + 1)
         results.append((worst(curve), Stretch(d, start, stop), other))
     return _evidence(results)
+
+
+def rows_of(found: Counterparts, trusted: Trusted) -> list[int]:
+    """Return the rows of the trusted references; of all where fewer than two are trusted."""
+    rows = [row for row, r in enumerate(found.references) if trusted[r]]
+    return rows if len(rows) >= 2 else list(range(len(found.references)))
 
 
 def worst(curve: NDArray[np.floating]) -> float:
@@ -119,12 +127,13 @@ def peak(curve: NDArray[np.floating]) -> tuple[int, int]:
 
 
 class _Reference:
-    """What is usual at each moment of one reference."""
+    """What is usual among the trusted at each moment of one reference."""
 
-    def __init__(self, found: Counterparts, row: int) -> None:
+    def __init__(self, found: Counterparts, row: int, trusted: Trusted) -> None:
         self.number = found.references[row]
         self._matches = found.there[row]
-        self._others = [k for k in found.references if k != self.number]
+        others = [found.references[other] for other in rows_of(found, trusted)]
+        self._others = [k for k in others if k != self.number]
         matches = [self._matches[k] for k in self._others]
         self._nears = np.stack([np.log(m.near + TINY) for m in matches if m is not None])
         self._lengths = found.lengths

@@ -9,9 +9,9 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.moments.cells import cell_pictures
 from filtering.moments.counterparts import Counterparts, find_counterparts
-from filtering.moments.decision import CUT, KINDS, exceedances, losses_of, telling
-from filtering.moments.effects import ineffective
-from filtering.moments.evidence import Evidence, Stretch, extra, missing_and_order
+from filtering.moments.decision import CUT, KINDS, judge, losses_of, most_telling, telling
+from filtering.moments.effects import View, ineffective, observe
+from filtering.moments.evidence import Evidence, Stretch, Trusted, extra, missing_and_order
 from filtering.moments.suitable import (
     LEAST_RETURN,
     check_videos,
@@ -115,29 +115,33 @@ def score_moments(cameras: Mapping[str, Sequence[Video]]) -> MomentScore:
                 "These videos do not show one task: most of their moments have no counterpart in "
                 "the other videos; filter the videos of one task at a time."
             )
-        evidence = {camera: gather(one, moving[camera]) for camera, one in useful.items()}
-    return _judged(evidence, useful, structure)
+        views = {camera: observe(one, moving[camera]) for camera, one in useful.items()}
+        return _judged(useful, views, structure)
 
 
-def gather(found: Counterparts, videos: Sequence[Video]) -> dict[str, Evidence]:
-    """Return the evidence of every kind that one camera gives."""
-    missing, order = missing_and_order(found)
-    kinds = (missing, order, extra(found), ineffective(found, videos))
+def gather(found: Counterparts, views: Sequence[View], trusted: Trusted) -> dict[str, Evidence]:
+    """Return the evidence of every kind that one camera gives, measured by the trusted."""
+    missing, order = missing_and_order(found, trusted)
+    kinds = (missing, order, extra(found, trusted), ineffective(found, views, trusted))
     return dict(zip(KINDS, kinds, strict=True))
 
 
 def _judged(
-    evidence: Mapping[str, Mapping[str, Evidence]],
     found: Mapping[str, Counterparts],
+    views: Mapping[str, Sequence[View]],
     structure: Mapping[str, float],
 ) -> MomentScore:
     """Put cameras and kinds together."""
-    cameras = list(evidence)
-    exceeded: dict[str, Array] = {}
-    chosen: dict[str, NDArray[np.int64]] = {}
-    for kind in KINDS:
-        each = [exceedances(kind, evidence[camera][kind].values) for camera in cameras]
-        exceeded[kind], chosen[kind] = np.max(each, axis=0), telling(each)
+    cameras = list(found)
+    evidence: dict[str, dict[str, Evidence]] = {}
+
+    def values(trusted: Trusted) -> list[dict[str, Array]]:
+        evidence.update({c: gather(found[c], views[c], trusted) for c in cameras})
+        return [{kind: evidence[c][kind].values for kind in KINDS} for c in cameras]
+
+    _, each = judge(values, len(next(iter(found.values())).lengths))
+    exceeded = most_telling(each)
+    chosen = {kind: telling([one[kind] for one in each]) for kind in KINDS}
     findings = []
     for d in range(len(next(iter(exceeded.values())))):
         said = []

@@ -4,12 +4,12 @@ import pytest
 from filtering.judging.moments import Timeline, judge_moments
 from filtering.moments.agreement import agree
 from filtering.moments.counterparts import choose_references, compare, find_counterparts
-from filtering.moments.decision import KINDS, exceedances
+from filtering.moments.decision import KINDS, exceedances, judge
 from filtering.moments.effects import states_of, usual_change
 from filtering.moments.evidence import peak, worst
 from filtering.moments.score import score_moments
 from filtering.moments.vectors import Video, moment_vectors
-from filtering.moments.windows import window_distances
+from filtering.moments.windows import PACES, window_distances
 from teasim.common.errors import ConfigError
 from tests.filtering.moments.toy_videos import LENGTH, STEPS, toy_video, usual_videos
 
@@ -26,11 +26,19 @@ def with_a_step_missing():
     return judged([*usual_videos(7), toy_video(MISSING, 50)])
 
 
-def test_window_distances_are_sums_along_diagonals():
+def test_window_distances_are_sums_along_the_pace_that_fits_best():
     rng = np.random.default_rng(0)
     one, other = (rng.normal(size=(n, 3)).astype(np.float32) for n in (12, 15))
     distances = window_distances(one, other, reach=2)
-    direct = np.sqrt(sum(np.square(one[5 + i] - other[7 + i]).sum() for i in range(-2, 3)))
+    direct = min(
+        np.sqrt(
+            sum(
+                np.square(one[5 + round(p * i)] - other[7 + round(q * i)]).sum()
+                for i in range(-2, 3)
+            )
+        )
+        for p, q in PACES
+    )
     assert distances.shape == (12, 15)
     assert distances[5, 7] == pytest.approx(direct, rel=1e-4)
     assert np.allclose(distances.T, window_distances(other, one, reach=2), atol=1e-3)
@@ -77,6 +85,27 @@ def test_a_step_without_effect_is_found_though_its_motion_is_as_usual():
 
 def test_a_pool_without_mistakes_is_not_accused():
     assert not judged(usual_videos(9)).flagged.any()
+
+
+@pytest.mark.parametrize("tempo", [0.8, 0.9, 1.1, 1.25])
+def test_a_correct_video_of_another_tempo_is_not_accused(tempo):
+    score = judged([*usual_videos(7), toy_video(range(STEPS), 50, tempo=tempo)])
+    assert not score.flagged.any()
+
+
+@pytest.mark.parametrize("seed", [0, 100, 200])
+def test_correct_videos_of_all_tempi_are_not_accused(seed):
+    tempi = np.geomspace(0.8, 1.25, 9)
+    videos = [toy_video(range(STEPS), seed + n, tempo=tempo) for n, tempo in enumerate(tempi)]
+    assert not judged(videos).flagged.any()
+
+
+def test_eight_of_eighteen_that_leave_steps_out_are_found():
+    # Seven leave step 2 out, more than pass for variety until the four that also leave 1 out go.
+    wrong = [[0, 1, 3, 4]] * 3 + [[0, 3, 4]] * 4 + [[0, 1, 2, 4]]
+    videos = [toy_video(order, 50 + number) for number, order in enumerate(wrong)]
+    flagged = judged([*usual_videos(10), *videos]).flagged
+    assert flagged.tolist() == [False] * 10 + [True] * 8
 
 
 def test_a_missing_step_stands_out_among_other_tempi():
@@ -126,9 +155,43 @@ def test_large_pools_are_compared_with_central_videos_alone():
 
 def test_an_evidence_is_measured_against_its_pool():
     values = np.array([0.1, 0.2, 0.15, 0.12, 0.9])
+    everybody = np.ones(5, dtype=bool)
     for kind in KINDS:
-        assert exceedances(kind, values).argmax() == 4
-    assert np.allclose(exceedances("missing", values), exceedances("missing", values + 3))
+        assert exceedances(kind, values, everybody).argmax() == 4
+    assert np.allclose(
+        exceedances("missing", values, everybody), exceedances("missing", values + 3, everybody)
+    )
+
+
+def test_an_evidence_is_measured_against_the_trusted_alone():
+    values = np.array([0.1, 0.2, 0.15, 0.12, 0.9])
+    trusted = np.array([True, True, True, True, False])
+    far = np.where(trusted, values, 50.0)
+    expected = exceedances("missing", values, trusted)
+    assert np.array_equal(exceedances("missing", far, trusted)[:4], expected[:4])
+
+
+def test_who_is_flagged_is_trusted_no_longer():
+    told = []
+
+    def evidence(trusted):
+        told.append(trusted.tolist())
+        values = np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.4, 2.0])
+        # Without the worst one the last but one stands out, as of two that hide each other.
+        values[5] += 2.0 * (not trusted[6])
+        return [dict.fromkeys(KINDS, values)]
+
+    trusted, _ = judge(evidence, 7)
+    assert told[0] == [True] * 7
+    assert trusted.tolist() == [True] * 5 + [False] * 2
+
+
+def test_half_of_a_pool_is_always_trusted():
+    def evidence(trusted):
+        return [dict.fromkeys(KINDS, np.arange(6.0) * 10 * (trusted.sum() - 1))]
+
+    trusted, _ = judge(evidence, 6)
+    assert trusted.sum() >= 3
 
 
 def test_the_worst_twelfth_counts():
