@@ -162,7 +162,9 @@ def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
     confidence = fitted.segments_.confidence()
     if confidence is not None:
         found = len(fitted.segments_.subtasks)
-        print(f"{found} sub-tasks, recognised with a mean probability of {confidence:.2f}.")
+        print(
+            f"{found} {'sub-task' if found == 1 else 'sub-tasks'}, recognised with a mean probability of {confidence:.2f}."
+        )
     names = {demo.demo_id: demo.name for demo in pool.episodes}
     for row in fitted.table():
         if row.flagged:

@@ -156,7 +156,7 @@ def test_filtering_a_pool(
     toy_pool: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    assert main([str(toy_pool.root), "-o", str(out), "--jobs", "1"]) == 0
+    assert main([str(toy_pool.root), "-o", str(out), "--jobs", "1", "--segmenter", "logged"]) == 0
     printed = capsys.readouterr().out
     assert "2 of 7 demonstrations are flagged." in printed
     assert (out / "report.html").is_file()
@@ -167,6 +167,7 @@ def test_too_many_flagged_is_exit_code_1(
     toy_pool: Pool, tmp_path: Path, share: str, code: int
 ) -> None:
     argv = [str(toy_pool.root), "-o", str(tmp_path / "out"), "--jobs", "1"]
+    argv += ["--segmenter", "logged"]
     assert main([*argv, "--max-flagged", share]) == code
 
 
