@@ -1,0 +1,188 @@
+"""Learning the decision from drawn pools: networks, then a calibration on pools held back."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.special import expit
+from sklearn.linear_model import LogisticRegression
+from torch import Tensor
+from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
+
+from filtering.judging.decision.drawing import Lesson
+from filtering.judging.decision.model import DecisionModel, Line, rounded
+from filtering.judging.decision.network import DecisionNetwork, Shape, squash
+from filtering.judging.decision.pools import FACTS
+from filtering.vision.determinism import seeded
+from teasim.common.arrays import Array
+
+
+@dataclass(frozen=True)
+class LearningConfig:
+    """How networks are fitted."""
+
+    seed: int = 0
+    """Seed of the first network; the others have the numbers after it."""
+    networks: int = 2
+    """Number of networks whose logits are averaged."""
+    epochs: int = 12
+    """Passes over the pools."""
+    batch: int = 32
+    """Pools per step."""
+    rate: float = 2e-3
+    """Largest learning rate of AdamW; one cycle."""
+    decay: float = 0.02
+    """Weight decay of AdamW."""
+    dropout: float = 0.1
+    """Share of the columns left out at random."""
+    facts: float = 0.1
+    """Weight of the loss of the facts about the pool."""
+    held_back: float = 0.1
+    """Share of the pools, the last ones, for the calibration."""
+
+
+Log = Callable[[str], None]
+"""Receives a line about the progress."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Pools padded to one size."""
+
+    rows: Tensor
+    """(B, D, F) squashed columns."""
+    pairs: Tensor
+    """(B, D, D, P) columns of pairs."""
+    mask: Tensor
+    """(B, D) False for padding."""
+    incorrect: Tensor
+    """(B, D) truth."""
+    facts: Tensor
+    """(B, 4) truth about the pools."""
+
+
+def pad(lessons: Sequence[Lesson]) -> Batch:
+    """Return lessons as one batch."""
+    number, most = len(lessons), max(len(lesson.rows) for lesson in lessons)
+    rows = torch.zeros(number, most, lessons[0].rows.shape[1])
+    pairs = torch.zeros(number, most, most, lessons[0].pairs.shape[2])
+    mask = torch.zeros(number, most, dtype=torch.bool)
+    incorrect = torch.zeros(number, most)
+    for row, lesson in enumerate(lessons):
+        demos = len(lesson.rows)
+        rows[row, :demos] = torch.from_numpy(lesson.rows)
+        pairs[row, :demos, :demos] = torch.from_numpy(lesson.pairs)
+        mask[row, :demos] = True
+        incorrect[row, :demos] = torch.from_numpy(lesson.incorrect).float()
+    facts = torch.from_numpy(np.stack([lesson.facts for lesson in lessons])).float()
+    return Batch(squash(rows), pairs, mask, incorrect, facts)
+
+
+def learn(lessons: Sequence[Lesson], config: LearningConfig, log: Log = print) -> DecisionModel:
+    """Fit networks to all lessons but the last ones, and calibrate on those."""
+    kept = round(len(lessons) * (1 - config.held_back))
+    networks = []
+    for number in range(config.networks):
+        with seeded(config.seed + number):
+            networks.append(_fit(lessons[:kept], config, number, log))
+    return calibrated(tuple(networks), lessons[kept:], {"learning": asdict(config)})
+
+
+def _fit(
+    lessons: Sequence[Lesson], config: LearningConfig, number: int, log: Log
+) -> DecisionNetwork:
+    rng = np.random.default_rng([config.seed, number])
+    shape = Shape(lessons[0].rows.shape[1], lessons[0].pairs.shape[2], len(FACTS))
+    network = DecisionNetwork(shape, config.dropout)
+    _standardise(network, lessons)
+    steps = len(lessons) // config.batch
+    optimiser = torch.optim.AdamW(network.parameters(), config.rate, weight_decay=config.decay)
+    plan = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, config.rate, total_steps=config.epochs * steps + 1, pct_start=0.15
+    )
+    network.train()
+    for epoch in range(config.epochs):
+        losses = []
+        for rows in _like_sizes(rng, lessons, steps):
+            loss = _loss(network, pad([lessons[row] for row in rows]), config.facts)
+            optimiser.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+            optimiser.step()
+            plan.step()
+            losses.append(float(loss.detach()))
+        log(f"network {number + 1}, epoch {epoch + 1}: loss {np.mean(losses):.4f}")
+    return rounded(network)
+
+
+def _standardise(network: DecisionNetwork, lessons: Sequence[Lesson]) -> None:
+    some = squash(torch.from_numpy(np.concatenate([lesson.rows for lesson in lessons[:3000]])))
+    network.centre.copy_(some.mean(0))
+    network.scale.copy_(some.std(0) + 0.05)
+
+
+def _like_sizes(
+    rng: np.random.Generator, lessons: Sequence[Lesson], steps: int
+) -> list[NDArray[np.int64]]:
+    """Return batches in random order; pools of like size go together, to pad little."""
+    sizes = np.array([len(lesson.rows) for lesson in lessons])
+    order = np.argsort(sizes * np.exp(0.1 * rng.normal(size=len(sizes))))
+    batches = np.array_split(order, steps)
+    return [batches[number] for number in rng.permutation(len(batches))]
+
+
+def _loss(network: DecisionNetwork, batch: Batch, facts_weight: float) -> Tensor:
+    """Return the cross-entropy; a pool of D demonstrations counts as sqrt(D)."""
+    logits, facts = network(batch.rows, batch.pairs, batch.mask)
+    weight = batch.mask.float() / batch.mask.sum(1, keepdim=True).float().sqrt()
+    each = cross_entropy(logits, batch.incorrect, reduction="none") * weight
+    return each.sum() / weight.sum() + facts_weight * cross_entropy(facts, batch.facts)
+
+
+def calibrated(
+    networks: tuple[DecisionNetwork, ...], lessons: Sequence[Lesson], card: dict[str, object]
+) -> DecisionModel:
+    """Return a model whose logits fit the truth of pools that the networks have not seen."""
+    raw = DecisionModel(networks, (1.0, 0.0), {}, {})
+    logits, facts, truth = [], [], []
+    for start in range(0, len(lessons), 32):
+        batch = pad(lessons[start : start + 32])
+        demos, pools = raw.mean_logits(batch.rows, batch.pairs, batch.mask)
+        logits.append(demos[batch.mask.numpy()])
+        truth.append(batch.incorrect[batch.mask].numpy())
+        facts.append(pools)
+    every, incorrect = np.concatenate(logits), np.concatenate(truth)
+    pools, stated = np.concatenate(facts), np.stack([lesson.facts for lesson in lessons])
+    demo = _line(every, incorrect)
+    lines = {name: _line(pools[:, k], stated[:, k]) for k, name in enumerate(FACTS)}
+    measured = calibration(expit(demo[0] * every + demo[1]), incorrect.astype(np.float64))
+    return DecisionModel(networks, demo, lines, card | {"held back": measured})
+
+
+def _line(logits: Array, truth: NDArray[np.generic]) -> Line:
+    if len(np.unique(truth)) < 2:
+        return 1.0, 0.0
+    fitted = LogisticRegression(C=1e6).fit(logits[:, None], truth)
+    return float(fitted.coef_[0, 0]), float(fitted.intercept_[0])
+
+
+def calibration(p: Array, truth: Array, bins: int = 10) -> dict[str, object]:
+    """Return the expected calibration error, the Brier score, and the reliability diagram.
+
+    Args:
+        p: (n,) probabilities.
+        truth: (n,) 0 or 1.
+        bins: number of bins of equal width.
+    """
+    place = np.minimum((p * bins).astype(int), bins - 1)
+    used = [place == number for number in range(bins) if (place == number).any()]
+    diagram = [(int(at.sum()), float(p[at].mean()), float(truth[at].mean())) for at in used]
+    base = float(truth.mean())
+    return {
+        "ece": sum(number * abs(mean - share) for number, mean, share in diagram) / len(p),
+        "brier": float(((p - truth) ** 2).mean()),
+        "brier of the base rate": base * (1 - base),
+        "diagram": diagram,
+    }
