@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from filtering.judging.decision.description import describe
 from filtering.judging.decision.model import DecisionModel, shipped_model
 from filtering.judging.decision.observed import Observed, canonical
-from filtering.judging.decision.pools import FACTS, MOST_DEMOS
+from filtering.judging.decision.prior.pools import FACTS, MOST_DEMOS
 from filtering.judging.evidence import Evidence
 from teasim.common.arrays import Array
 

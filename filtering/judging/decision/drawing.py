@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.judging.decision.description import describe
 from filtering.judging.decision.observed import canonical
-from filtering.judging.decision.pools import draw_pool
+from filtering.judging.decision.prior.pools import draw_pool
 from teasim.common.files import write_atomically
 
 CHUNK = 250

@@ -59,3 +59,15 @@ def _places(pool: Observed, weight: Array, n_labels: int) -> tuple[Array, Array]
     mean = first / total
     variance = np.maximum(second / total - mean**2, 0) * (total + 1) / total
     return mean, np.sqrt(variance)
+
+
+def above_null(null: Array, losses: Array) -> dict[str, Array]:
+    """Compare losses (D,) with those of honest demonstrations."""
+    most = np.quantile(null, 0.9 ** (1 / len(losses)))
+    return {
+        "null.z": (losses - null.mean()) / (null.std() + 0.5),
+        "null.above": losses - most,
+        "null.share": (null[None] >= losses[:, None]).mean(axis=1),
+        "null.mean": np.full(len(losses), null.mean()),
+        "null.spread": np.full(len(losses), null.std()),
+    }

@@ -14,7 +14,7 @@ from torch.nn.functional import binary_cross_entropy_with_logits as cross_entrop
 from filtering.judging.decision.drawing import Lesson
 from filtering.judging.decision.model import DecisionModel, Line, rounded
 from filtering.judging.decision.network import DecisionNetwork, Shape, squash
-from filtering.judging.decision.pools import FACTS
+from filtering.judging.decision.prior.pools import FACTS
 from filtering.vision.determinism import seeded
 from teasim.common.arrays import Array
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.judging.decision.tasks import Task
+from filtering.judging.decision.prior.tasks import Task
 from filtering.judging.norm.steps import StepList
 from teasim.common.arrays import Array
 
-NOISELESS = 0.5
+NOISELESS = 0.45
 """Share of the pools whose segments are right."""
-LEAST_RATE, LARGEST_RATE = 0.005, 0.16
+LEAST_RATE, LARGEST_RATE = 0.008, 0.16
 """Range of the mean rate of each kind of error per step, drawn log-uniformly."""
 LARGEST_CHANCE = 0.5
 """Largest probability of one kind of error of a step."""

@@ -16,8 +16,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.judging.decision.mistakes import FOREIGN, SHARES, draw_recipe, make_mistakes
-from filtering.judging.decision.noise import (
+from filtering.judging.decision.observed import Observed
+from filtering.judging.decision.prior.mistakes import SHARES, draw_recipe, make_mistakes
+from filtering.judging.decision.prior.noise import (
     Noise,
     Report,
     draw_noise,
@@ -25,8 +26,8 @@ from filtering.judging.decision.noise import (
     report,
     surprises,
 )
-from filtering.judging.decision.observed import Observed
-from filtering.judging.decision.tasks import (
+from filtering.judging.decision.prior.tasks import (
+    FOREIGN,
     Habit,
     Task,
     draw_habit,
@@ -40,7 +41,7 @@ FEWEST_DEMOS, MOST_DEMOS = 4, 60
 """Range of the number of demonstrations, drawn log-uniformly."""
 STYLES = ("script", "orders", "close", "varied", "free")
 """How alike correct demonstrations are: one order, an order per person, and around a habit."""
-STYLE_SHARES = (0.27, 0.10, 0.20, 0.25, 0.18)
+STYLE_SHARES = (0.28, 0.14, 0.18, 0.23, 0.17)
 """How often pools have each of STYLES."""
 FEW_ORDERS = 0.9
 """Share of the pools drawn anew because their correct demonstrations, although free to vary, show
@@ -126,11 +127,11 @@ def _draw_people(rng: np.random.Generator) -> People:
     task = draw_task(rng, exact=style == "script")
     stick = [0.0, rng.uniform(0, 1), rng.uniform(0.9, 1)][rng.choice(3, p=[0.35, 0.3, 0.35])]
     closeness = {"close": rng.uniform(1.5, 4), "varied": rng.uniform(0.3, 1.5)}.get(style, 50.0)
-    count, evenness = int(rng.choice([1, 2, 3], p=[0.62, 0.23, 0.15])), 1.5
+    count, evenness = int(rng.choice([1, 2, 3], p=[0.62, 0.23, 0.15])), 4.0
     if style == "script":
         count = 1
     elif style == "orders":
-        count, evenness = int(rng.integers(2, 6)), 20.0
+        count, evenness = int(rng.choice([2, 3, 3, 4, 5])), 20.0
     elif style == "free":
         closeness = rng.uniform(0, 0.3)
     habits = tuple(draw_habit(rng, task, closeness=closeness, stick=stick) for _ in range(count))
@@ -143,18 +144,17 @@ def _draw_people(rng: np.random.Generator) -> People:
 def _draw_groups(rng: np.random.Generator, n_demos: int, script: bool) -> list[Group]:
     """Draw how many are incorrect in which ways."""
     kind = rng.random()
-    if kind < 0.04:  # most of them, in the same way
+    if kind < 0.03:  # most of them, in the same way
         most = int(rng.uniform(0.52, 0.75) * n_demos)
         return [Group(max(most, 1), True)]
-    if n_demos >= 7 and kind < (0.22 if script else 0.12):
-        first = rng.uniform(0.15, 0.38)
+    if n_demos >= 7 and kind < (0.26 if script else 0.12):
+        first = rng.uniform(0.15, 0.4)
         second = rng.uniform(0.08, min(0.25, 0.55 - first))
         counts = [max(1, round(share * n_demos)) for share in (first, second)]
         return [Group(counts[0], True), Group(counts[1], bool(rng.random() < 0.6))]
     regime = rng.random()
-    count = (
-        1 if regime < 0.28 else 2 if regime < 0.42 else int(rng.integers(1, int(0.6 * n_demos) + 1))
-    )
+    count = int(rng.integers(1, int(0.6 * n_demos) + 1))
+    count = 1 if regime < 0.25 else 2 if regime < 0.35 else count
     count = min(count, max(1, int(0.6 * n_demos)))
     shared = count > 1 and rng.random() < (0.62 if script else 0.4)
     return [Group(min(count, max(1, int(0.47 * n_demos))) if shared else count, bool(shared))]
@@ -165,8 +165,8 @@ def _draw_orders(
 ) -> tuple[list[list[int]], NDArray[np.int64]]:
     """Return an order of nodes per demonstration, and whether it is incorrect or ineffective."""
     task = people.task
-    shares = rng.dirichlet(SHARES * 5)
-    more = float(rng.choice([0.0, 0.7, 2.0, 4.0], p=[0.35, 0.25, 0.25, 0.15]))
+    shares = rng.dirichlet(SHARES * 3)
+    more = float(rng.choice([0.0, 0.7, 2.0, 4.0], p=[0.27, 0.25, 0.28, 0.2]))
     orders: list[list[int]] = []
     truth = np.full(n_demos, CORRECT)
     for group in groups:

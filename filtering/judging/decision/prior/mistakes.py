@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.judging.decision.tasks import Task
+from filtering.judging.decision.prior.tasks import Task
 
 TRIES = 12
 """Attempts to make a mistake that breaks the precedence."""
@@ -40,7 +40,7 @@ def move(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
         start = int(rng.integers(len(order) - size + 1))
         rest = order[:start] + order[start + size :]
         near = int(np.clip(start + rng.choice([-3, -2, -1, 1, 2, 3]), 0, len(rest)))
-        target = int(rng.choice([near, rng.integers(len(rest) + 1), 0, len(rest)]))
+        target = int(rng.choice([near, int(rng.integers(len(rest) + 1)), 0, len(rest)]))
         return rest[:target] + order[start : start + size] + rest[target:]
 
     return _broken(task, order, moved)
