@@ -15,9 +15,9 @@ import numpy as np
 from check_sequences import Drawn, clean_teas, recipes, salads, teas
 
 from filtering.judging.config import DECISIONS, JudgingConfig
+from filtering.judging.decision.calibration import calibration
 from filtering.judging.decision.decide import decide
 from filtering.judging.decision.prior.pools import draw_pool
-from filtering.judging.decision.training import calibration
 from filtering.judging.evidence import Evidence
 from filtering.judging.judges import Judgement, by_norm
 from filtering.judging.norm.steps import StepList

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from filtering.judging.decision import drawing
+from filtering.judging.decision.calibration import calibration
 from filtering.judging.decision.description import describe
 from filtering.judging.decision.drawing import draw_lesson, draw_lessons, read_lessons
 from filtering.judging.decision.model import load_model, save_model
 from filtering.judging.decision.observed import canonical
 from filtering.judging.decision.prior.pools import draw_pool
-from filtering.judging.decision.training import LearningConfig, calibration, learn
+from filtering.judging.decision.training import LearningConfig, learn
 from filtering.vision.determinism import one_thread
 
 SMALL = LearningConfig(networks=1, epochs=2, batch=8, held_back=0.25)

@@ -148,8 +148,8 @@ def test_the_cost_of_a_miss_sets_the_cut() -> None:
     [
         (0.0, {"clean": 0.9}, ["clean"]),
         (0.2, {"clean": 0.1}, ["unsure"]),
-        (0.9, {}, ["contaminated"]),
-        (0.9, {"noisy": 0.9}, ["contaminated"]),
+        (0.9, {}, ["contaminated", "no majority"]),
+        (0.9, {"noisy": 0.9}, ["contaminated", "no majority"]),
         (0.2, {"noisy": 0.9}, ["too noisy to judge"]),
         (0.9, {"majority incorrect": 0.3}, ["contaminated", "no majority"]),
         (0.0, {"clean": 0.9, "several ways": 0.9}, ["clean", "several ways of doing it"]),

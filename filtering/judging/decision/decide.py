@@ -22,6 +22,9 @@ LIKELY = 0.5
 MAJORITY_DOUBT = 0.2
 """Probability of an incorrect majority from which the pool has no majority to rely on. Below
 LIKELY, because all probabilities are wrong where the majority is."""
+THIN = 0.4
+"""Share of flagged demonstrations from which the majority is too thin to rely on: which
+of two parts of like size is the correct one, no pool can tell."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ class PoolDecision:
             found.append("contaminated: some demonstrations are probably incorrect")
         elif self.facts["clean"] >= LIKELY:
             found.append("clean: probably no demonstration is incorrect")
-        if self.facts["majority incorrect"] >= MAJORITY_DOUBT:
+        thin = self.flagged.mean() >= THIN
+        if thin or self.facts["majority incorrect"] >= MAJORITY_DOUBT:
             found.append(
                 "no majority: perhaps more than half of the demonstrations are incorrect in the "
                 "same way; the majority may be wrong"

@@ -1,7 +1,6 @@
-"""What incorrect demonstrations do: chance mistakes, and recipes that a minority shares."""
+"""What incorrect demonstrations do by chance."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ Order = list[int]
 
 def omit(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
     """Leave out one to three mandatory steps."""
-    must = _mandatory(task, order)
+    must = mandatory(task, order)
     if len(order) < 3 or not must:
         return None
     count = min(int(rng.choice([1, 1, 1, 2, 2, 3])), len(must), len(order) - 2)
@@ -27,7 +26,7 @@ def omit(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
 def stop(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
     """Stop before the last one to three steps."""
     cut = int(rng.integers(1, 4))
-    if len(order) - cut < 2 or not _mandatory(task, order[-cut:]):
+    if len(order) - cut < 2 or not mandatory(task, order[-cut:]):
         return None
     return order[:-cut]
 
@@ -60,17 +59,17 @@ def swap(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
 
 def substitute(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
     """Do a foreign step in place of a mandatory one."""
-    must = _mandatory(task, order)
+    must = mandatory(task, order)
     if not must:
         return None
     out = int(rng.choice(must))
-    return [_foreign(rng, task) if node == out else node for node in order]
+    return [foreign(rng, task) if node == out else node for node in order]
 
 
 def add(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
     """Do a foreign step in addition."""
     place = int(rng.integers(len(order) + 1))
-    return [*order[:place], _foreign(rng, task), *order[place:]]
+    return [*order[:place], foreign(rng, task), *order[place:]]
 
 
 def repeat(rng: np.random.Generator, _task: Task, order: Order) -> Order | None:
@@ -105,88 +104,13 @@ def make_mistakes(
     return order, made > 0
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """What a minority does instead, as a function of a correct order."""
-
-    omitted: tuple[int, ...]
-    """Nodes that are left out."""
-    moves: tuple[tuple[tuple[int, ...], int], ...]
-    """Blocks of nodes and the node after which each is done."""
-    added: tuple[int, int] | None
-    """A node that is done in addition, and the node after which."""
-    each: float
-    """Probability that an omitted node is left out; at least one is."""
-
-    def follow(self, rng: np.random.Generator, task: Task, order: Order) -> tuple[Order, bool]:
-        """Return the order of the minority, and whether it is incorrect."""
-        out = {node for node in self.omitted if rng.random() < self.each}
-        if self.omitted and not out:
-            out = {int(rng.choice(self.omitted))}
-        new = [node for node in order if node not in out]
-        for block, after in self.moves:
-            if after in new:
-                rest = [node for node in new if node not in block]
-                place = rest.index(after) + 1
-                new = [*rest[:place], *(node for node in block if node in new), *rest[place:]]
-        if self.added and self.added[1] in new:
-            place = new.index(self.added[1]) + 1
-            new = [*new[:place], self.added[0], *new[place:]]
-        wrong = new != order and (len(new) != len(order) or task.violated(new))
-        return (new, True) if wrong and len(new) >= 2 else (order, False)
-
-
-def draw_recipe(rng: np.random.Generator, task: Task, order: Order) -> Recipe:
-    """Draw the recipe of a minority of people whose correct order would be `order`."""
-    kind = rng.choice(["omits", "moves", "both", "adds"], p=[0.4, 0.4, 0.12, 0.08])
-    omitted = _omitted(rng, task, order) if kind in ("omits", "both") else ()
-    moves = _moves(rng, task, [n for n in order if n not in omitted]) if kind != "omits" else ()
-    added = None
-    if kind == "adds":
-        moves = ()
-        again = int(rng.choice(order)) if rng.random() < 0.5 else _foreign(rng, task)
-        others = [node for node in order if node != again]
-        added = (again, int(rng.choice(others)))
-    return Recipe(omitted, moves, added, float(rng.choice([1.0, rng.uniform(0.3, 1)])))
-
-
-def _omitted(rng: np.random.Generator, task: Task, order: Order) -> tuple[int, ...]:
-    must = _mandatory(task, order)
-    if len(must) < 3:
-        return ()
-    most = max(2, min(8, len(must) // 2) + 1)
-    count = int(rng.integers(1, most if rng.random() < 0.5 else min(most, 4)))
-    if rng.random() < 0.5:  # neighbours: a part of the task
-        start = int(rng.integers(len(must) - count + 1))
-        return tuple(must[start : start + count])
-    return tuple(rng.choice(must, count, replace=False).tolist())
-
-
-def _moves(
-    rng: np.random.Generator, task: Task, kept: Order
-) -> tuple[tuple[tuple[int, ...], int], ...]:
-    moves = []
-    for _ in range(int(rng.choice([1, 1, 1, 2, 3]))):
-        for _ in range(TRIES):
-            size = int(rng.choice([1, 1, 2]))
-            if len(kept) <= size + 1:
-                break
-            start = int(rng.integers(len(kept) - size + 1))
-            block, rest = kept[start : start + size], kept[:start] + kept[start + size :]
-            place = int(rng.integers(len(rest)))
-            new = rest[: place + 1] + block + rest[place + 1 :]
-            if new != kept and task.violated(new):
-                moves.append((tuple(block), rest[place]))
-                kept = new
-                break
-    return tuple(moves)
-
-
-def _mandatory(task: Task, order: Order) -> Order:
+def mandatory(task: Task, order: Order) -> Order:
+    """Return the nodes of an order that no correct demonstration leaves out."""
     return [node for node in order if node >= 0 and task.chance[node] == 1]
 
 
-def _foreign(rng: np.random.Generator, task: Task) -> int:
+def foreign(rng: np.random.Generator, task: Task) -> int:
+    """Draw a foreign step."""
     return -1 - int(rng.integers(task.foreign))
 
 

@@ -9,10 +9,11 @@ from filtering.judging.decision.prior.tasks import Task
 from filtering.judging.norm.steps import StepList
 from teasim.common.arrays import Array
 
-NOISELESS = 0.45
+NOISELESS = 0.5
 """Share of the pools whose segments are right."""
-LEAST_RATE, LARGEST_RATE = 0.008, 0.16
-"""Range of the mean rate of each kind of error per step, drawn log-uniformly."""
+LEAST_RATE, LARGEST_RATE = 0.02, 0.16
+"""Range of the mean rate of each kind of error per step, drawn log-uniformly: segments are either
+right or visibly not."""
 LARGEST_CHANCE = 0.5
 """Largest probability of one kind of error of a step."""
 

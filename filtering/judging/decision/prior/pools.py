@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.judging.decision.observed import Observed
-from filtering.judging.decision.prior.mistakes import SHARES, draw_recipe, make_mistakes
+from filtering.judging.decision.prior.mistakes import SHARES, make_mistakes
 from filtering.judging.decision.prior.noise import (
     Noise,
     Report,
@@ -26,30 +26,18 @@ from filtering.judging.decision.prior.noise import (
     report,
     surprises,
 )
-from filtering.judging.decision.prior.tasks import (
-    FOREIGN,
-    Habit,
-    Task,
-    draw_habit,
-    draw_order,
-    draw_present,
-    draw_task,
-)
+from filtering.judging.decision.prior.people import People, draw_people
+from filtering.judging.decision.prior.recipes import draw_recipe
+from filtering.judging.decision.prior.tasks import FOREIGN, Task
 from teasim.common.arrays import Array
 
 FEWEST_DEMOS, MOST_DEMOS = 4, 60
 """Range of the number of demonstrations, drawn log-uniformly."""
-STYLES = ("script", "orders", "close", "varied", "free")
-"""How alike correct demonstrations are: one order, an order per person, and around a habit."""
-STYLE_SHARES = (0.28, 0.14, 0.18, 0.23, 0.17)
-"""How often pools have each of STYLES."""
 FEW_ORDERS = 0.9
 """Share of the pools drawn anew because their correct demonstrations, although free to vary, show
 two or three orders only: people vary in many ways or not at all."""
 NOISY = 0.2
 """Errors of the segmenter per step from which a pool counts as noisy."""
-EFFECTS = 0.25
-"""Share of the pools whose videos are examined for effects."""
 CORRECT, INCORRECT, INEFFECTIVE = 0, 1, 2
 """Truth of a demonstration: correct, incorrect in its steps, or only a step without effect."""
 FACTS = ("clean", "noisy", "majority incorrect", "several ways")
@@ -78,29 +66,6 @@ class Group:
     """Whether they share a recipe; otherwise each makes mistakes by chance."""
 
 
-@dataclass(frozen=True)
-class People:
-    """Who demonstrates a task, and how."""
-
-    task: Task
-    """What is to be done."""
-    habits: tuple[Habit, ...]
-    """The habits of the people."""
-    shares: Array
-    """Share of the demonstrations of each habit."""
-    style: str
-    """One of STYLES."""
-    effects: bool
-    """Whether the videos are examined for effects."""
-    ineffective: float
-    """Probability that an incorrect demonstration does all steps, one without effect."""
-
-    def order(self, rng: np.random.Generator) -> list[int]:
-        """Draw a correct order of nodes."""
-        habit = self.habits[int(rng.choice(len(self.habits), p=self.shares))]
-        return draw_order(rng, self.task, habit, draw_present(rng, self.task))
-
-
 def draw_pool(
     rng: np.random.Generator, *, n_demos: int | None = None, clean: bool | None = None
 ) -> DrawnPool:
@@ -115,36 +80,17 @@ def draw_pool(
     n_demos = n_demos or round(np.exp(size))
     clean = bool(rng.random() < 0.3) if clean is None else clean
     while True:
-        people = _draw_people(rng)
+        people = draw_people(rng)
         groups = [] if clean else _draw_groups(rng, n_demos, people.style == "script")
         orders, truth = _draw_orders(rng, people, groups, n_demos)
         if not _ambiguous(rng, people.style, orders, truth != CORRECT):
             return _observe(rng, people, orders, truth)
 
 
-def _draw_people(rng: np.random.Generator) -> People:
-    style = str(rng.choice(STYLES, p=STYLE_SHARES))
-    task = draw_task(rng, exact=style == "script")
-    stick = [0.0, rng.uniform(0, 1), rng.uniform(0.9, 1)][rng.choice(3, p=[0.35, 0.3, 0.35])]
-    closeness = {"close": rng.uniform(1.5, 4), "varied": rng.uniform(0.3, 1.5)}.get(style, 50.0)
-    count, evenness = int(rng.choice([1, 2, 3], p=[0.62, 0.23, 0.15])), 4.0
-    if style == "script":
-        count = 1
-    elif style == "orders":
-        count, evenness = int(rng.choice([2, 3, 3, 4, 5])), 20.0
-    elif style == "free":
-        closeness = rng.uniform(0, 0.3)
-    habits = tuple(draw_habit(rng, task, closeness=closeness, stick=stick) for _ in range(count))
-    shares = rng.dirichlet(np.full(count, evenness))
-    effects = bool(rng.random() < EFFECTS)
-    ineffective = float(rng.uniform(0, 0.7)) if effects else 0.0
-    return People(task, habits, shares, style, effects, ineffective)
-
-
 def _draw_groups(rng: np.random.Generator, n_demos: int, script: bool) -> list[Group]:
     """Draw how many are incorrect in which ways."""
     kind = rng.random()
-    if kind < 0.03:  # most of them, in the same way
+    if kind < 0.04:  # most of them, in the same way
         most = int(rng.uniform(0.52, 0.75) * n_demos)
         return [Group(max(most, 1), True)]
     if n_demos >= 7 and kind < (0.26 if script else 0.12):

@@ -1,4 +1,4 @@
-"""Random procedural tasks: partial orders of steps, some of them optional, and people's habits.
+"""Random procedural tasks: partial orders of steps, some of them optional.
 
 Tasks are drawn from a prior alone; no data set is read. A node is one occurrence of a step in the
 recipe: two nodes may have the same label.
@@ -49,18 +49,6 @@ class Task:
         return bool(np.tril(self.before[np.ix_(nodes, nodes)], -1).any())
 
 
-@dataclass(frozen=True)
-class Habit:
-    """How a person orders steps that the task leaves free."""
-
-    rank: Array
-    """(n,) position of each node in the preferred order."""
-    closeness: float
-    """Rate of the exponential distribution of the distance from the preferred next step."""
-    stick: float
-    """Probability to go on with the part of the task that was begun."""
-
-
 def draw_task(rng: np.random.Generator, *, exact: bool) -> Task:
     """Draw a task; in exact ones, as scripts and robots follow them, hardly anything is free."""
     steps = round(np.exp(rng.uniform(np.log(FEWEST_STEPS), np.log(MOST_STEPS))))
@@ -88,10 +76,10 @@ def draw_task(rng: np.random.Generator, *, exact: bool) -> Task:
 
 def _chances(rng: np.random.Generator, n: int, exact: bool) -> Array:
     chance = np.ones(n)
-    if rng.random() < (0.15 if exact else 0.45):
+    if rng.random() < (0.25 if exact else 0.55):
         count = min(n - 3, int(rng.choice([1, 1, 2, 2, 3, 4, 5])))
         # A rarely omitted step of a script is a mistake; an optional one is omitted often.
-        range_ = (0.25, 0.75) if exact else (0.1, 0.85)
+        range_ = (0.2, 0.8) if exact else (0.15, 0.85)
         chance[rng.choice(n, count, replace=False)] = rng.uniform(*range_, count)
     return chance
 
@@ -142,57 +130,3 @@ def _chains(rng: np.random.Generator, n: int) -> Shape:
 
 SHAPES = (_line, _series_parallel, _random, _chains)
 """How the order of a task is drawn: one line, nested parts, any pairs, or chains."""
-
-
-def draw_habit(rng: np.random.Generator, task: Task, *, closeness: float, stick: float) -> Habit:
-    """Draw a person's preferred order."""
-    n = len(task.labels)
-    order = draw_order(rng, task, Habit(rng.random(n), 0.0, stick), list(range(n)))
-    rank = np.empty(n)
-    rank[order] = np.arange(n)
-    return Habit(rank, closeness, stick)
-
-
-def draw_present(rng: np.random.Generator, task: Task) -> list[int]:
-    """Draw the nodes of one correct demonstration."""
-    free = np.flatnonzero(task.chance < 1)
-    present = np.ones(len(task.chance), bool)
-    if not len(free):
-        return list(range(len(present)))
-    chance = task.chance[free]
-    if task.options == "all or none":
-        present[free] = rng.random() < chance.mean()
-    elif task.options == "one missing":
-        present[rng.choice(free)] = rng.random() < chance.mean()
-    elif task.options == "one of them":
-        present[free] = False
-        present[rng.choice(free, p=chance / chance.sum())] = True
-    else:
-        present[free] = rng.random(len(free)) < chance
-    return np.flatnonzero(present).tolist()
-
-
-def draw_order(rng: np.random.Generator, task: Task, habit: Habit, present: list[int]) -> list[int]:
-    """Draw an order of the nodes `present`: of those that may come next, one near to the habit."""
-    left = sorted(present, key=lambda node: habit.rank[node])
-    waiting = task.before[np.ix_(left, left)].sum(axis=0).tolist()
-    waits = dict(zip(left, waiting, strict=True))
-    order: list[int] = []
-    while left:
-        free = [node for node in left if not waits[node]]
-        if order and rng.random() < habit.stick:
-            part = task.chunk[order[-1]]
-            free = [node for node in free if task.chunk[node] == part] or free
-        order.append(_next(rng, free, habit.closeness))
-        left.remove(order[-1])
-        for node in left:
-            waits[node] -= int(task.before[order[-1], node])
-    return order
-
-
-def _next(rng: np.random.Generator, free: list[int], closeness: float) -> int:
-    if len(free) == 1 or closeness > 20:
-        return free[0]
-    if closeness < 0.02:
-        return free[int(rng.integers(len(free)))]
-    return free[min(int(rng.exponential(1 / closeness)), 10**6) % len(free)]
