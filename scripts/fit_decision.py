@@ -27,11 +27,11 @@ class FitDecision:
     """Folder for decision.safetensors and decision.json."""
     seed: int = 1
     """Seed of the pools and of the networks."""
-    count: int = 12000
+    count: int = 15000
     """Number of pools."""
     networks: int = 2
     """Number of networks whose logits are averaged."""
-    epochs: int = 12
+    epochs: int = 9
     """Passes over the pools."""
 
 

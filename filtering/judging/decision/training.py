@@ -25,7 +25,7 @@ class LearningConfig:
     """Seed of the first network; the others have the numbers after it."""
     networks: int = 2
     """Number of networks whose logits are averaged."""
-    epochs: int = 12
+    epochs: int = 9
     """Passes over the pools."""
     batch: int = 32
     """Pools per step."""
