@@ -9,7 +9,9 @@ from filtering.judging.decision.description import describe
 from filtering.judging.decision.drawing import draw_lesson, draw_lessons, read_lessons
 from filtering.judging.decision.model import load_model, save_model
 from filtering.judging.decision.observed import canonical
+from filtering.judging.decision.prior.mistakes import omit
 from filtering.judging.decision.prior.pools import draw_pool
+from filtering.judging.decision.prior.tasks import draw_task
 from filtering.judging.decision.training import LearningConfig, learn
 from filtering.vision.determinism import one_thread
 
@@ -59,3 +61,11 @@ def test_the_calibration_error_is_that_of_the_bins():
     assert found["brier"] == pytest.approx((0.01 + 0.81 + 0.01 + 0.01) / 4)
     assert found["brier of the base rate"] == pytest.approx(0.75 * 0.25)
     assert found["diagram"] == [(2, pytest.approx(0.1), 0.5), (2, pytest.approx(0.9), 1.0)]
+
+
+def test_a_mistake_never_leaves_nothing():
+    rng = np.random.default_rng(0)
+    task = draw_task(rng, exact=True)
+    orders = [omit(rng, task, [0, 1, 0, 1]) for _ in range(50)]
+    assert None in orders
+    assert [] not in orders

@@ -20,7 +20,7 @@ def omit(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
         return None
     count = min(int(rng.choice([1, 1, 1, 2, 2, 3])), len(must), len(order) - 2)
     out = set(rng.choice(must, count, replace=False).tolist())
-    return [node for node in order if node not in out]
+    return [node for node in order if node not in out] or None  # a step may be there twice
 
 
 def stop(rng: np.random.Generator, task: Task, order: Order) -> Order | None:

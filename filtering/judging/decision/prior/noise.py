@@ -64,7 +64,7 @@ def draw_noise(rng: np.random.Generator, n_labels: int, *, exact: bool) -> Noise
         mix=rng.dirichlet(np.full(5, 0.8)) * 5 * np.array([0.4, 0.25, 0.6, 1.6, 1.0]),
         weak=rng.gamma(1.0, 1.0, n_labels) if rng.random() < 0.7 else np.ones(n_labels),
         alike=rng.integers(0, n_labels, (n_labels, 2)),
-        shape=float(rng.choice([0.7, 2.0, 8.0])),
+        shape=float(rng.choice([0.7, 1.2, 3.0])),
         swallow=float(rng.choice([0.0, 0.15, 0.4])),
         spread=float(rng.choice([0.02, 0.2, 0.35, 0.6], p=[0.1, 0.25, 0.4, 0.25])),
         loop=0.0 if exact or rng.random() > 0.2 else float(rng.uniform(0.005, 0.12)),

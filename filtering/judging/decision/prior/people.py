@@ -10,7 +10,7 @@ from teasim.common.arrays import Array
 
 STYLES = ("script", "orders", "close", "varied", "free")
 """How alike correct demonstrations are: one order, an order per person, and around a habit."""
-STYLE_SHARES = (0.28, 0.14, 0.18, 0.23, 0.17)
+STYLE_SHARES = (0.26, 0.19, 0.17, 0.22, 0.16)
 """How often pools have each of STYLES."""
 EFFECTS = 0.25
 """Share of the pools whose videos are examined for effects."""
@@ -45,7 +45,7 @@ def draw_people(rng: np.random.Generator) -> People:
     task = draw_task(rng, exact=style == "script")
     stick = [0.0, rng.uniform(0, 1), rng.uniform(0.9, 1)][rng.choice(3, p=[0.35, 0.3, 0.35])]
     closeness = {"close": rng.uniform(1.5, 4), "varied": rng.uniform(0.3, 1.5)}.get(style, 50.0)
-    count, evenness = int(rng.choice([1, 2, 3], p=[0.62, 0.23, 0.15])), 4.0
+    count, evenness = int(rng.choice([1, 2, 3], p=[0.62, 0.23, 0.15])), 8.0
     if style == "script":
         count = 1
     elif style == "orders":

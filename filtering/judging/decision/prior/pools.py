@@ -100,7 +100,7 @@ def _draw_groups(rng: np.random.Generator, n_demos: int, script: bool) -> list[G
         return [Group(counts[0], True), Group(counts[1], bool(rng.random() < 0.6))]
     regime = rng.random()
     count = int(rng.integers(1, int(0.6 * n_demos) + 1))
-    count = 1 if regime < 0.25 else 2 if regime < 0.35 else count
+    count = 1 if regime < 0.22 else 2 if regime < 0.32 else count
     count = min(count, max(1, int(0.6 * n_demos)))
     shared = count > 1 and rng.random() < (0.62 if script else 0.4)
     return [Group(min(count, max(1, int(0.47 * n_demos))) if shared else count, bool(shared))]
@@ -112,7 +112,7 @@ def _draw_orders(
     """Return an order of nodes per demonstration, and whether it is incorrect or ineffective."""
     task = people.task
     shares = rng.dirichlet(SHARES * 3)
-    more = float(rng.choice([0.0, 0.7, 2.0, 4.0], p=[0.27, 0.25, 0.28, 0.2]))
+    more = float(rng.choice([0.0, 0.7, 2.0, 4.0], p=[0.2, 0.25, 0.3, 0.25]))
     orders: list[list[int]] = []
     truth = np.full(n_demos, CORRECT)
     for group in groups:
