@@ -161,15 +161,16 @@ def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
     print(f"cameras looked at: {', '.join(fitted.looked_at_) or 'none'}")
     confidence = fitted.segments_.confidence()
     if confidence is not None:
-        found = len(fitted.segments_.subtasks)
-        print(
-            f"{found} {'sub-task' if found == 1 else 'sub-tasks'}, recognised with a mean probability of {confidence:.2f}."
-        )
+        count = len(fitted.segments_.subtasks)
+        found = "1 sub-task" if count == 1 else f"{count} sub-tasks"
+        print(f"{found}, recognised with a mean probability of {confidence:.2f}.")
     names = {demo.demo_id: demo.name for demo in pool.episodes}
     for row in fitted.table():
         if row.flagged:
             print(f"{names[row.demo_id]}  weight {row.weight:.2f}  {row.reason}")
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
+    for words in fitted.decision_.words if fitted.decision_ else ():
+        print(f"{words}.")
     warning = caution(len(fitted.weights_))
     if warning is not None:
         print(warning)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,9 @@ from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.soundness import require_sound
 from teasim.pool.source import Source
 from teasim.pool.weight_table import WeightRow
+
+if TYPE_CHECKING:
+    from filtering.judging.decision.decide import PoolDecision
 
 FEWEST_DEMOS = 3
 """Least number of demonstrations; fewer have no majority."""
@@ -79,7 +82,9 @@ from the whole video.
     After `fit`, in the order of `pool.episodes`:
         weights_ (D,): in [0, 1], 1 for a usual demonstration.
         losses_ (D,): surprise [nats], higher is worse.
-        probabilities_ (D,): probability of being incorrect, see `probability_incorrect`.
+        probabilities_ (D,): probability of being incorrect, of the learned decision or else of
+            `probability_incorrect`.
+        decision_: the learned decision; None where clusters decided.
         flagged_ (D,): True for demonstrations called incorrect.
         groups_ (D,): group, 0 is the best.
         group_names_: what each group has in common; empty where only the weights define it.
@@ -99,6 +104,7 @@ from the whole video.
     weights_: NDArray[np.float64]
     losses_: NDArray[np.float64]
     probabilities_: NDArray[np.float64]
+    decision_: "PoolDecision | None"
     flagged_: NDArray[np.bool_]
     groups_: NDArray[np.int64]
     group_names_: tuple[str, ...]
@@ -152,6 +158,7 @@ from the whole video.
                 flagged=bool(self.flagged_[row]),
                 group=int(self.groups_[row]),
                 reason=self.reasons_[row],
+                p_incorrect=float(self.probabilities_[row]),
             )
             for row, (demo_id, index) in enumerate(self._identities)
         )
@@ -226,7 +233,8 @@ from the whole video.
 
     def _evidence(self, pool: Source, workers: Workers) -> Evidence:
         """Return the evidence that the score uses."""
-        known = Evidence(self.segments_.subtasks, self.segments_.spans)
+        found = self.segments_
+        known = Evidence(found.subtasks, found.spans, reliability=found.reliability())
         if self.chosen_.score == "equation3":
             return replace(known, states=self._states(pool, workers))
         if self.config.effects and pool.cameras:
@@ -271,7 +279,12 @@ from the whole video.
     def _learn(self, judgement: Judgement, fps: float | None) -> None:
         self.weights_ = judgement.weights
         self.losses_ = judgement.losses
-        self.probabilities_ = probability_incorrect(judgement.losses)
+        self.decision_ = judgement.decision
+        self.probabilities_ = (
+            probability_incorrect(judgement.losses)
+            if judgement.decision is None
+            else judgement.decision.probabilities
+        )
         self.trust_ = judgement.trust
         self.objective_ = judgement.objective
         self.groups_ = judgement.grouping.groups

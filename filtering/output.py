@@ -29,6 +29,8 @@ FILES = ("weights.csv", "segments.csv", "filter.json", "keep.txt", "exclude.txt"
 PACKAGES = ("teasim", "numpy", "scipy", "scikit-learn", "torch", "opencv-python-headless")
 """Packages whose versions are recorded, because weights may depend on them."""
 
+LEARNED = "learned decision: P(incorrect | the whole pool), see docs/decision.md"
+"""Definition of probability_incorrect where the learned decision was used."""
 PROBABILITY = (
     "probability of the upper of two Gaussians of equal variance fitted to sqrt(loss), times the "
     "probability by BIC that there are two"
@@ -153,8 +155,25 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "trusted": float(fitted.trust_.sum()),
         "trust": _by_demo(fitted, fitted.trust_),
         "probability_incorrect": _by_demo(fitted, fitted.probabilities_),
-        "probability_is": PROBABILITY,
+        "probability_is": PROBABILITY if fitted.decision_ is None else LEARNED,
+        "decision": _decision_record(fitted),
         "seconds": {stage: round(spent, 3) for stage, spent in fitted.timings_.items()},
+    }
+
+
+def _decision_record(fitted: DemoFilter) -> dict[str, Any] | None:
+    """Return what was decided about the pool as a whole; None where clusters decided."""
+    found = fitted.decision_
+    if found is None:
+        return None
+    return {
+        "words": list(found.words),
+        "p_clean": found.facts["clean"],
+        "facts": dict(found.facts),
+        "cost": found.cost,
+        "cut": found.cut,
+        "expected_recall": found.expected_recall,
+        "model_sha256": found.sha256,
     }
 
 

@@ -34,6 +34,9 @@ NORM = "norm"
 CRITICAL = ("add_tea_bag", "add_water", "turn_off_oven")
 """What the paper's Seq_3 leaves out."""
 
+Drawn = tuple[list[StepList], list[bool]]
+"""A pool, and which of its demonstrations are incorrect."""
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -62,8 +65,10 @@ def judge(demos: Sequence[StepList], wrong: Sequence[bool]) -> Judged:
     return Judged(every, losses > cut_of(losses), probability_incorrect(losses), np.array(wrong))
 
 
-def salads(root: Path, k: int, pools: int) -> Iterator[Judged]:
-    """Draw 10 cutting-first salads and k whose dressing is removed, as segmented by a network."""
+def salads(
+    root: Path, k: int, pools: int, *, correct_ones: int = 10, true_labels: bool = False
+) -> Iterator[Drawn]:
+    """Draw cutting-first salads and k whose dressing is removed, as segmented by a network."""
     folder = MSTCNFolder.open(root)
     dressing = [folder.names.index(name) for name in DRESSING]
     dropped = [folder.names.index(name) for name in NO_STEPS]
@@ -71,6 +76,7 @@ def salads(root: Path, k: int, pools: int) -> Iterator[Judged]:
     for video in folder.videos:
         truth, seen = folder.truth(video), folder.predictions(video)
         assert truth is not None
+        seen = truth if true_labels else seen
         begins = next(label for label in truth.tolist() if label not in dropped)
         if begins in dressing:
             seen = seen[~np.isin(truth, dressing)]
@@ -78,14 +84,14 @@ def salads(root: Path, k: int, pools: int) -> Iterator[Judged]:
         (wrong if begins in dressing else correct).append(steps)
     for seed in range(pools):
         rng = np.random.default_rng([k, seed])
-        good = rng.choice(len(correct), 10, replace=False)
+        good = rng.choice(len(correct), correct_ones, replace=False)
         bad = rng.choice(len(wrong), k, replace=False)
         demos = [correct[index] for index in good] + [wrong[index] for index in bad]
-        yield judge(demos, [False] * 10 + [True] * k)
+        yield demos, [False] * correct_ones + [True] * k
 
 
-def recipes(root: Path) -> Iterator[tuple[str, Judged]]:
-    """Judge every recipe of CaptainCook4D: missing steps and order errors against correct ones."""
+def recipes(root: Path) -> Iterator[tuple[str, Drawn]]:
+    """Read every recipe of CaptainCook4D: missing steps and order errors against correct ones."""
     for folder in sorted(path for path in root.iterdir() if path.is_dir()):
         rows = [
             row
@@ -93,7 +99,7 @@ def recipes(root: Path) -> Iterator[tuple[str, Judged]]:
             if row["correct"] == "1" or any(kind in row["errors"] for kind in VISIBLE)
         ]
         demos = [_steps(MSTCNFolder.open(folder), row["video"]) for row in rows]
-        yield folder.name, judge(demos, [row["correct"] == "0" for row in rows])
+        yield folder.name, (demos, [row["correct"] == "0" for row in rows])
 
 
 def _labels(folder: Path) -> list[dict[str, str]]:
@@ -107,7 +113,7 @@ def _steps(folder: MSTCNFolder, video: str) -> StepList:
     return steps_of_frames(truth)
 
 
-def teas(root: Path, k: int, pools: int) -> Iterator[Judged]:
+def teas(root: Path, k: int, pools: int) -> Iterator[Drawn]:
     """Draw 10 correct full-length teas and k of which one or two critical steps are deleted."""
     folder = MSTCNFolder.open(root)
     critical = [folder.names.index(name) for name in CRITICAL]
@@ -120,7 +126,16 @@ def teas(root: Path, k: int, pools: int) -> Iterator[Judged]:
         drawn = [_steps(folder, full[i]) for i in rng.choice(len(full), 10 + k, replace=False)]
         for index in range(10, 10 + k):
             drawn[index] = _without(drawn[index], rng.permutation(critical)[: 1 + seed % 2])
-        yield judge(drawn, [False] * 10 + [True] * k)
+        yield drawn, [False] * 10 + [True] * k
+
+
+def clean_teas(root: Path, pools: int) -> Iterator[Drawn]:
+    """Draw 12 correct teas, some without milk or sugar."""
+    folder = MSTCNFolder.open(root)
+    correct = [row["video"] for row in _labels(root) if row["correct"] == "1"]
+    for seed in range(pools):
+        drawn = np.random.default_rng([0, seed]).choice(len(correct), 12, replace=False)
+        yield [_steps(folder, correct[i]) for i in drawn], [False] * 12
 
 
 def _without(demo: StepList, labels: np.ndarray) -> StepList:
@@ -141,9 +156,9 @@ def main() -> int:
             _print(f"50-Salads, predicted, 10 + {k}", salads(root / "50salads", k, arguments.pools))
     if (root / "captaincook4d").is_dir():
         found = list(recipes(root / "captaincook4d"))
-        for name, judged in found:
-            _print(f"CaptainCook4D, {name}", [judged])
-        _print("CaptainCook4D, all recipes", [judged for _, judged in found])
+        for name, drawn in found:
+            _print(f"CaptainCook4D, {name}", [drawn])
+        _print("CaptainCook4D, all recipes", [drawn for _, drawn in found])
     if (root / "tea_unh").is_dir():
         for k in (1, 4, 8):
             _print(f"UNH tea, deletions, 10 + {k}", teas(root / "tea_unh", k, arguments.pools))
@@ -155,8 +170,8 @@ def _print_head() -> None:
     print(f"{'AUROC of':34}{names}  | {NORM}: accuracy  recall  falsely flagged  Brier")
 
 
-def _print(name: str, pools: Iterable[Judged]) -> None:
-    judged = list(pools)
+def _print(name: str, pools: Iterable[Drawn]) -> None:
+    judged = [judge(*drawn) for drawn in pools]
     areas = "".join(
         f"{np.mean([found.areas[score] for found in judged]):10.3f}" for score in (NORM, *BASELINES)
     )

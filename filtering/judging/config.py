@@ -18,6 +18,9 @@ PRECEDENCE_FILE = PrimitiveConstructorSpec(
 )
 """How the command line reads precedence: from a file."""
 
+DECISIONS = ("learned", "clusters")
+"""Ways to decide who is flagged."""
+
 
 @dataclass(frozen=True)
 class JudgingConfig:
@@ -33,6 +36,13 @@ class JudgingConfig:
     threshold: float | str = "auto"
     """Weight below which a demonstration is flagged: a number between 0 and 1, auto (the rule of
     the score), or the mid-points between groups of weights found by kmeans, gmm or minibatch."""
+    decision: str = "clusters"
+    """How losses become flags: clusters (a cut between clusters of the losses), or learned (the
+    probability of being incorrect, given the whole pool). Only clusters are used where groups,
+    threshold, tolerance or precedence are given, and for the score equation3."""
+    cost: float = 2.0
+    """False alarms that a miss is worth: the learned decision flags demonstrations that are
+    incorrect with a probability above 1 / (1 + cost)."""
     tolerance: float = 0.0
     """Tolerance for behaviour that a minority shares, from 0 to below 1; 0.2 keeps legal orders
     that a few demonstrations share. For the score norm."""
@@ -55,6 +65,12 @@ class JudgingConfig:
         """
         if not 0.0 <= self.tolerance < 1.0:
             raise ConfigError(f"tolerance is {self.tolerance}; choose a share from 0 to below 1.")
+        if self.decision not in DECISIONS:
+            raise ConfigError(
+                f"Unknown decision '{self.decision}'; choose {' or '.join(DECISIONS)}."
+            )
+        if not 0.0 < self.cost < math.inf:
+            raise ConfigError(f"cost is {self.cost}; choose a number above 0.")
         if not 0.0 < self.trusted_share < 1.0:
             raise ConfigError(
                 f"trusted_share is {self.trusted_share}; choose a share between 0 and 1."
@@ -67,6 +83,13 @@ class JudgingConfig:
             )
         if not isinstance(self.threshold, str):
             self._check_number(self.threshold)
+
+    @property
+    def learns(self) -> bool:
+        """Whether the learned decision is used."""
+        plain = self.groups == "auto" and self.threshold == "auto"
+        exact = not self.tolerance and not self.precedence
+        return self.decision == "learned" and self.score == "norm" and plain and exact
 
     def _check_number(self, threshold: float) -> None:
         if not 0.0 < threshold < 1.0:

@@ -26,19 +26,27 @@ class Evidence:
     """Per demonstration (q,): how surprisingly little each segment changed [nats], see
     `filtering.effects.surprise`; None where the videos were not examined for effects."""
 
+    reliability: Sequence[Array] | None = None
+    """Per demonstration (q,): mean probability that the segmenter gives the label of each segment;
+    None where segments were given, not inferred."""
+
     @cached_property
     def labels(self) -> list[list[int]]:
         """Per demonstration the label numbers of its segments, 0..T-1."""
         return label_numbers(self.segments, self.subtasks)
 
+    @property
+    def step_lists(self) -> tuple[StepList, ...]:
+        """Per demonstration its segments as labels and lengths [frames]."""
+        return tuple(
+            StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
+            for labels, spans in zip(self.labels, self.segments, strict=True)
+        )
+
     @cached_property
     def counts(self) -> StepCounts:
         """Occurrence, precedence and next steps."""
-        demos = [
-            StepList(tuple(labels), tuple(span.stop - span.start for span in spans))
-            for labels, spans in zip(self.labels, self.segments, strict=True)
-        ]
-        return count_steps(demos, len(self.subtasks))
+        return count_steps(self.step_lists, len(self.subtasks))
 
     @property
     def places(self) -> Places:

@@ -1,10 +1,14 @@
 """The result of judging the demonstrations of a pool, whatever they were judged by."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from filtering.judging.explain import Finding
 from filtering.judging.thresholds import Grouping
 from teasim.common.arrays import Array
+
+if TYPE_CHECKING:
+    from filtering.judging.decision.decide import PoolDecision
 
 
 @dataclass(frozen=True)
@@ -26,3 +30,5 @@ class Judgement:
     reasons: tuple[str, ...] | None = None
     """Per demonstration a sentence on the most important finding; None where the findings name
     sub-tasks and `explain` writes it."""
+    decision: "PoolDecision | None" = None
+    """The learned decision; None where clusters decided."""

@@ -7,6 +7,7 @@
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,13 +19,16 @@ from filtering.judging.equation3.solvers import solver_named
 from filtering.judging.equation3.surprises import find_surprises
 from filtering.judging.evidence import Evidence
 from filtering.judging.judgement import Judgement
-from filtering.judging.norm.cut import decide
+from filtering.judging.norm.cut import by_nature, decide
 from filtering.judging.norm.departures import find_departures
 from filtering.judging.norm.norm_score import NormScore, score_steps
 from filtering.judging.norm.precedence import precedence_graph
-from filtering.judging.thresholds import group_weights
+from filtering.judging.thresholds import Grouping, group_weights
 from teasim.common.arrays import Array
 from teasim.common.registry import named
+
+if TYPE_CHECKING:
+    from filtering.judging.decision.decide import PoolDecision
 
 INEFFECTIVE_PRIOR = 1.0
 """Log-odds against an ineffective step before the video is examined [nats]. A round number, odds of
@@ -50,11 +54,26 @@ def by_norm(evidence: Evidence, config: JudgingConfig) -> Judgement:
     ineffective = ineffective_losses(found, evidence)
     worst = np.array([nats.max(initial=0.0) for nats in ineffective])
     losses = found.losses + worst
-    weights, grouping = decide(losses, found.left_out + worst > found.out_of_order, config.groups)
-    if config.threshold != "auto":
-        grouping = group_weights(weights, config.groups, config.threshold)
+    left_out = found.left_out + worst > found.out_of_order
+    decision = None
+    if config.learns:
+        decision = _learned(evidence, config.cost)
+        weights = 1 - decision.probabilities
+        numbers, names = by_nature(decision.flagged, left_out)
+        grouping = Grouping(numbers, (1 - decision.cut) * (numbers.max() > 0), names)
+    else:
+        weights, grouping = decide(losses, left_out, config.groups)
+        if config.threshold != "auto":
+            grouping = group_weights(weights, config.groups, config.threshold)
     findings = find_departures(found, evidence.labels, evidence.places, ineffective)
-    return Judgement(losses, weights, grouping, found.trust, findings)
+    return Judgement(losses, weights, grouping, found.trust, findings, decision=decision)
+
+
+def _learned(evidence: Evidence, cost: float) -> "PoolDecision":
+    # Imported here because torch takes a second.
+    from filtering.judging.decision import decide as learned
+
+    return learned.decide(learned.observed(evidence), cost)
 
 
 def ineffective_losses(found: NormScore, evidence: Evidence) -> list[Array]:

@@ -47,6 +47,24 @@ class Segmentation:
             return None
         return float(np.concatenate([video.max(axis=1) for video in self.posteriors]).mean())
 
+    def reliability(self) -> list[NDArray[np.float64]] | None:
+        """Return per demonstration (q,): mean posterior of the label of each segment.
+
+        None where segments were given, not inferred.
+        """
+        if self.posteriors is None:
+            return None
+        return [
+            np.array(
+                [
+                    video[span.start : span.stop, label].mean()
+                    for span, label in zip(*demo, strict=True)
+                ],
+                dtype=np.float64,
+            )
+            for video, *demo in zip(self.posteriors, self.spans, self.labels(), strict=True)
+        ]
+
 
 def label_numbers(spans: Sequence[tuple[Span, ...]], subtasks: tuple[str, ...]) -> list[list[int]]:
     """Return per demonstration the label numbers of its segments, 0..T-1.

@@ -30,6 +30,8 @@ class WeightRow:
     """Its cluster; 0 is the best."""
     reason: str
     """One sentence naming the step and time span."""
+    p_incorrect: float | None = None
+    """Probability that it is incorrect, in [0, 1]; None in tables that do not have it."""
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -40,6 +42,10 @@ class WeightRow:
             raise PoolError(f"{what} has a negative number.")
         if not 0.0 <= self.weight <= 1.0:
             raise PoolError(f"{what} has the weight {self.weight}; it must lie in [0, 1].")
+        if self.p_incorrect is not None and not 0.0 <= self.p_incorrect <= 1.0:
+            raise PoolError(
+                f"{what} has the probability {self.p_incorrect}; it must lie in [0, 1]."
+            )
         if not math.isfinite(self.loss):
             raise PoolError(f"{what} has the loss {self.loss}; it must be finite.")
         if any(character in self.demo_id + self.reason for character in "\r\n\0"):
@@ -49,6 +55,8 @@ class WeightRow:
 
 
 COLUMNS = tuple(field.name for field in fields(WeightRow))
+EARLIER_COLUMNS = COLUMNS[:-1]
+"""Columns of tables without p_incorrect, which are still read."""
 
 
 def write_weight_table(path: Path | str, rows: Iterable[WeightRow]) -> None:
@@ -64,7 +72,8 @@ def write_weight_table(path: Path | str, rows: Iterable[WeightRow]) -> None:
     writer.writerow(COLUMNS)
     for row in ordered:
         numbers = [int(row.episode_index), float(row.weight), float(row.loss)]
-        writer.writerow([row.demo_id, *numbers, int(row.flagged), int(row.group), row.reason])
+        p = "" if row.p_incorrect is None else float(row.p_incorrect)
+        writer.writerow([row.demo_id, *numbers, int(row.flagged), int(row.group), row.reason, p])
     write_text(Path(path), text.getvalue())
 
 
@@ -82,9 +91,10 @@ def read_weight_table(path: Path | str) -> tuple[WeightRow, ...]:
         raise PoolError(f"There is no weight table at '{path}'.") from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise PoolError(f"The weight table '{path}' is not readable as CSV.") from error
-    if not lines or tuple(lines[0]) != COLUMNS:
+    if not lines or tuple(lines[0]) not in (COLUMNS, EARLIER_COLUMNS):
         raise PoolError(f"'{path}' is no weight table; its columns must be {', '.join(COLUMNS)}.")
-    rows = [_parse(path, number, cells) for number, cells in enumerate(lines[1:], start=2)]
+    count = len(lines[0])
+    rows = [_parse(path, number, cells, count) for number, cells in enumerate(lines[1:], start=2)]
     _check_unique(path, rows)
     return tuple(sorted(rows, key=lambda row: row.episode_index))
 
@@ -103,18 +113,18 @@ def match_rows(rows: Sequence[WeightRow], identities: Sequence[str]) -> list[Wei
     return [None if identity is None else own[identity] for identity in told]
 
 
-def _parse(path: Path, line: int, cells: Sequence[str]) -> WeightRow:
-    if len(cells) != len(COLUMNS):
+def _parse(path: Path, line: int, cells: Sequence[str], count: int) -> WeightRow:
+    if len(cells) != count:
         raise PoolError(
-            f"Line {line} of '{path}' has {len(cells)} values; a weight table has {len(COLUMNS)}."
+            f"Line {line} of '{path}' has {len(cells)} values; a weight table has {count}."
         )
-    demo_id, index, weight, loss, flagged, group, reason = cells
+    demo_id, index, weight, loss, flagged, group, reason, *more = cells
     if flagged not in ("0", "1"):
         raise PoolError(f"Line {line} of '{path}' says flagged is '{flagged}'; choose 0 or 1.")
     try:
-        return WeightRow(
-            demo_id, int(index), float(weight), float(loss), flagged == "1", int(group), reason
-        )
+        p = float(more[0]) if more and more[0] else None
+        whole = (demo_id, int(index), float(weight), float(loss), flagged == "1", int(group))
+        return WeightRow(*whole, reason, p)
     except ValueError as error:
         raise PoolError(f"Line {line} of '{path}' holds text in place of a number.") from error
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from filtering.segmentation.segments import decode, spans_of
+from filtering.segmentation.segments import Segmentation, decode, spans_of
 from teasim.pool import Span
 from teasim.pool.types import runs
 
@@ -77,3 +77,12 @@ def test_a_video_of_no_subtask_is_one_segment_of_the_likeliest(second, name):
     posteriors = np.tile([0.1, second, 0.9 - second], (4, 1))
     spans = spans_of(posteriors.argmax(axis=1), posteriors, ("pour", "stir"))
     assert spans == (Span(name, 0, 4),)
+
+
+def test_the_reliability_of_a_segment_is_the_mean_posterior_of_its_label():
+    posteriors = certain([0, 0, 1, 1], sure=0.8)
+    posteriors[1] = [0.6, 0.3, 0.1]
+    spans = ((Span("a", 0, 2), Span("b", 2, 4)),)
+    found = Segmentation(("a", "b", "c"), spans, (posteriors,))
+    assert found.reliability()[0] == pytest.approx([0.7, 0.8])
+    assert Segmentation(("a", "b", "c"), spans).reliability() is None

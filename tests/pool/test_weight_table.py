@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from teasim.common.errors import PoolError
 from teasim.pool.weight_table import COLUMNS, WeightRow, read_weight_table, write_weight_table
 
-ROW = WeightRow("ab12", 0, 0.25, 1.5, True, 1, "Stirring is missing, at 12.0 s.")
+ROW = WeightRow("ab12", 0, 0.25, 1.5, True, 1, "Stirring is missing, at 12.0 s.", 0.75)
 TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\r\n\0"), max_size=30)
 ROWS = st.builds(
     WeightRow,
@@ -22,6 +22,7 @@ ROWS = st.builds(
     flagged=st.booleans(),
     group=st.integers(0, 5),
     reason=TEXT,
+    p_incorrect=st.none() | st.floats(0, 1),
 )
 
 
@@ -39,15 +40,23 @@ def test_the_columns_are_the_contract(tmp_path: Path) -> None:
     path = tmp_path / "weights.csv"
     write_weight_table(path, [ROW])
     header, line = path.read_text().splitlines()
-    assert header == "demo_id,episode_index,weight,loss,flagged,group,reason"
-    assert line == 'ab12,0,0.25,1.5,1,1,"Stirring is missing, at 12.0 s."'
+    assert header == "demo_id,episode_index,weight,loss,flagged,group,reason,p_incorrect"
+    assert line == 'ab12,0,0.25,1.5,1,1,"Stirring is missing, at 12.0 s.",0.75'
+
+
+def test_tables_without_probabilities_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "weights.csv"
+    path.write_text(
+        "demo_id,episode_index,weight,loss,flagged,group,reason\nab12,0,0.25,1.5,1,1,x\n"
+    )
+    assert read_weight_table(path) == (replace(ROW, reason="x", p_incorrect=None),)
 
 
 def test_numpy_values_are_written_as_numbers(tmp_path: Path) -> None:
     path = tmp_path / "weights.csv"
     values: Any = (np.int64(0), np.float32(0.25), np.float64(1.5), np.True_, np.int64(1))
     index, weight, loss, flagged, group = values
-    numpy_row = WeightRow("ab12", index, weight, loss, flagged, group, "x")
+    numpy_row = WeightRow("ab12", index, weight, loss, flagged, group, "x", np.float64(0.75))
     write_weight_table(path, [numpy_row])
     assert read_weight_table(path) == (replace(ROW, reason="x"),)
 
@@ -57,6 +66,7 @@ def test_numpy_values_are_written_as_numbers(tmp_path: Path) -> None:
     [
         ({"weight": 1.5}, "has the weight 1.5; it must lie in [0, 1]."),
         ({"weight": float("nan")}, "has the weight nan; it must lie in [0, 1]."),
+        ({"p_incorrect": -0.1}, "has the probability -0.1; it must lie in [0, 1]."),
         ({"loss": float("inf")}, "has the loss inf; it must be finite."),
         ({"reason": "one\ntwo"}, "has a reason of more than one line."),
         ({"group": -1}, "has the group -1; groups count from 0."),
@@ -74,11 +84,11 @@ def test_values_out_of_range_are_refused(changes: dict[str, object], message: st
     [
         ("", "is no weight table; its columns must be demo_id, episode_index, weight, loss"),
         ("a,b\n1,2\n", "is no weight table; its columns must be"),
-        (f"{','.join(COLUMNS)}\nx,0,0.5\n", "has 3 values; a weight table has 7."),
-        (f"{','.join(COLUMNS)}\nx,0,half,1,0,0,r\n", "holds text in place of a number."),
-        (f"{','.join(COLUMNS)}\nx,0,0.5,1,yes,0,r\n", "says flagged is 'yes'; choose 0 or 1."),
-        (f"{','.join(COLUMNS)}\nx,0,2,1,0,0,r\n", "has the weight 2.0; it must lie in [0, 1]."),
-        (f"{','.join(COLUMNS)}\nx,0,1,1,0,0,r\ny,0,1,1,0,0,r\n", "has demonstration 0 twice."),
+        (f"{','.join(COLUMNS)}\nx,0,0.5\n", "has 3 values; a weight table has 8."),
+        (f"{','.join(COLUMNS)}\nx,0,half,1,0,0,r,\n", "holds text in place of a number."),
+        (f"{','.join(COLUMNS)}\nx,0,0.5,1,yes,0,r,\n", "says flagged is 'yes'; choose 0 or 1."),
+        (f"{','.join(COLUMNS)}\nx,0,2,1,0,0,r,\n", "has the weight 2.0; it must lie in [0, 1]."),
+        (f"{','.join(COLUMNS)}\nx,0,1,1,0,0,r,\ny,0,1,1,0,0,r,\n", "has demonstration 0 twice."),
     ],
 )
 def test_a_table_that_is_none_is_told(tmp_path: Path, text: str, message: str) -> None:

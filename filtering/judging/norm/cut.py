@@ -50,7 +50,7 @@ def decide(losses: Array, left_out: NDArray[np.bool_], groups: str) -> tuple[Arr
     """
     losses = losses.round(DIGITS)
     cut = cut_of(losses)
-    numbers, names = _by_nature(losses > cut, left_out)
+    numbers, names = by_nature(losses > cut, left_out)
     if groups != "auto" and int(groups) != numbers.max() + 1:
         clustered = group_weights(-np.sqrt(losses), groups)
         numbers, names = clustered.groups, clustered.names
@@ -59,7 +59,7 @@ def decide(losses: Array, left_out: NDArray[np.bool_], groups: str) -> tuple[Arr
     return weights, Grouping(numbers, 0.5 * (numbers.max() > 0), names)
 
 
-def _by_nature(
+def by_nature(
     flagged: NDArray[np.bool_], left_out: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Return group numbers (D,) without gaps and the names of the groups that occur."""

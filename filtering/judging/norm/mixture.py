@@ -10,7 +10,6 @@ The weights of the blocks were chosen on the data sets named in `norm_score`.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
 from filtering.judging.norm.steps import StepCounts
@@ -56,8 +55,8 @@ def find_populations(counts: StepCounts, seed: int = 0) -> Populations:
     rng = np.random.default_rng(seed)
     # Starts are drawn in the order of content, so that the order of the pool has no effect.
     ranks = np.argsort(np.lexsort(np.hstack([values, known]).T))
-    ends = [_climb(values, known * weights, rng.random(len(values))[ranks]) for _ in range(STARTS)]
-    share, probabilities, log_ratio, _ = max(ends, key=lambda end: end[3])
+    starts = np.stack([rng.random(len(values))[ranks] for _ in range(STARTS)])
+    share, probabilities, log_ratio = _climb(values, known * weights, starts)
     if share.sum() < len(share) / 2:
         share, probabilities, log_ratio = 1 - share, probabilities[::-1], -log_ratio
     return Populations(share, log_ratio, probabilities[:, : counts.n_subtasks])
@@ -82,23 +81,27 @@ def _features(counts: StepCounts) -> tuple[Array, Array, Array]:
     return values, is_known, weights
 
 
-def _climb(
-    values: Array, weights: Array, share: NDArray[np.float64]
-) -> tuple[Array, Array, Array, float]:
-    """Run EM; return responsibility (D,), probabilities (2, F), log-ratio (D,) and likelihood."""
+def _climb(values: Array, weights: Array, share: Array) -> tuple[Array, Array, Array]:
+    """Run EM from all starts (S, D) at once and use the end of greatest likelihood.
+
+    Returns:
+        Its responsibility (D,), probabilities (2, F) and log-ratio (D,).
+    """
     present, absent = weights * values, weights * (1 - values)
     known = np.maximum(weights.max(axis=0), 1e-12)
+    starts, demos = share.shape
     for _ in range(ITERATIONS):
-        shares = np.stack([share, 1 - share])
-        mixing = (shares.sum(axis=1) + SMOOTHING) / (len(share) + 2 * SMOOTHING)
+        shares = np.concatenate([share, 1 - share])
+        mixing = (shares.sum(axis=1) + SMOOTHING) / (demos + 2 * SMOOTHING)
         yes, no = shares @ present, shares @ absent
         probabilities = (yes / known + SMOOTHING) / ((yes + no) / known + 2 * SMOOTHING)
-        log_p = present @ np.log(probabilities).T + absent @ np.log(1 - probabilities).T
-        log_joint = log_p + np.log(mixing)
-        updated = expit(log_joint[:, 0] - log_joint[:, 1])
+        log_p = np.log(probabilities) @ present.T + np.log1p(-probabilities) @ absent.T
+        log_joint = log_p + np.log(mixing)[:, None]
+        updated = expit(log_joint[:starts] - log_joint[starts:])
         done = np.abs(updated - share).max() < 1e-6
         share = updated
         if done:
             break
-    likelihood = float(np.logaddexp(log_joint[:, 0], log_joint[:, 1]).sum())
-    return share, probabilities, log_p[:, 1] - log_p[:, 0], likelihood
+    best = int(np.logaddexp(log_joint[:starts], log_joint[starts:]).sum(axis=1).argmax())
+    own = [best, starts + best]
+    return share[best], probabilities[own], log_p[own[1]] - log_p[own[0]]

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from filtering.judging.kmeans import clusters
-from filtering.judging.norm.mixture import find_populations
+from filtering.judging.norm.mixture import Populations, find_populations
 from filtering.judging.norm.steps import StepCounts
 from teasim.common.arrays import Array
 from teasim.common.trimming import soft_trim
@@ -109,7 +109,15 @@ def score_steps(
             surprises less; at about 0.2, legal orders that a few share are not flagged.
         n_groups: clusters of sqrt(loss) for the refit, 2 or 3; the lowest is trusted.
     """
-    populations = find_populations(counts, seed)
+    return score_populations(
+        counts, find_populations(counts, seed), tolerance=tolerance, n_groups=n_groups
+    )
+
+
+def score_populations(
+    counts: StepCounts, populations: Populations, tolerance: float = 0.0, n_groups: int = 2
+) -> NormScore:
+    """Return the score of a pool whose two populations are known; see `score_steps`."""
     first = _score(counts, populations.norm)
     trimmed = _trim(first.losses)
     second = _score(counts, trimmed)
