@@ -89,7 +89,7 @@ class JudgingConfig:
         """Whether the learned decision is used."""
         plain = self.groups == "auto" and self.threshold == "auto"
         exact = not self.tolerance and not self.precedence
-        return self.decision == "learned" and self.score == "norm" and plain and exact
+        return self.decision == "learned" and self.score in ("auto", "norm") and plain and exact
 
     def _check_number(self, threshold: float) -> None:
         if not 0.0 < threshold < 1.0:
