@@ -151,8 +151,9 @@ class DemoSettings:
     """Episodes per policy and mode."""
     seed: int = 0
     """Seed of the pool and of the learner."""
-    frames_per_segment: int = 16
-    """Frames of each segment that the filter looks at; fewer than its default, for speed."""
+    segmenter: str = "auto"
+    """Source of the segments that the filter judges, as in `teasim filter`: auto finds them in the
+    videos alone, logged reads the labels of the pool."""
     environment: Environment = field(default_factory=partial(EnvironmentConfig, max_actions=10))
     """The environment. Making tea takes 7 actions; a policy that needs 3 more has failed."""
     workers: WorkerOptions = field(default_factory=Workers)

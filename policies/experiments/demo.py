@@ -83,7 +83,7 @@ def run_demo(settings: DemoSettings) -> str:
     out, workers, watch = settings.out, settings.workers, Stopwatch()
     pool = generate_pool(out / "pool", settings)
     watch.lap("generate")
-    fitted = DemoFilter(FilterConfig(frames_per_segment=settings.frames_per_segment))
+    fitted = DemoFilter(FilterConfig(segmenter=settings.segmenter))
     fitted.fit(pool, workers=workers)
     write_filter_output(out / "filter", pool, fitted)
     watch.lap("filter")

@@ -208,7 +208,9 @@ def test_other_settings_leave_the_decision_to_clusters(setting) -> None:
     assert not config.learns
     assert JudgingConfig(decision="learned").learns
     known = replace(evidence([[0, 1, 2]] * 4), states=[np.eye(8)[:3]] * 4)
-    assert JUDGES["norm" if config.score == "auto" else config.score](known, config).decision is None
+    assert (
+        JUDGES["norm" if config.score == "auto" else config.score](known, config).decision is None
+    )
 
 
 @pytest.mark.parametrize(

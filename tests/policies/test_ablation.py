@@ -24,7 +24,7 @@ FILTERS = """
 use = "ignore"
 [filters.norm]
 use = "discard"
-frames_per_segment = 4
+segmenter = "logged"
 [filters.labels]
 use = "labels"
 """

@@ -17,7 +17,15 @@ from tests.policies.fakes import FAKE_ID, SEQ_1, make_fake_pool
 
 def settings(out):
     world = EnvironmentConfig(FAKE_ID)
-    return DemoSettings(out=out, seq1=6, seq3=2, episodes=2, environment=world, workers=IN_PROCESS)
+    return DemoSettings(
+        out=out,
+        seq1=6,
+        seq3=2,
+        episodes=2,
+        segmenter="logged",  # the fake station's pictures show no steps
+        environment=world,
+        workers=IN_PROCESS,
+    )
 
 
 def fake_generate(path, config):
