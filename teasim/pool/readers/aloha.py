@@ -5,6 +5,7 @@ from pathlib import Path
 
 from teasim.common.errors import PoolError
 from teasim.pool.clips.hdf5 import opened
+from teasim.pool.hdf5.guard import require_readable
 from teasim.pool.hdf5.logs import logs_of
 from teasim.pool.hdf5.pictures import arrays, clips_in, files_in, group, logs_hash, root_names
 from teasim.pool.readers.reader import Reader, ReadOptions
@@ -35,6 +36,7 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
             f"'{path}' is a single ALOHA episode; a source is a folder with one file per episode."
         )
     files = sorted(files_in(path), key=lambda file: natural(file.name))
+    require_readable(files)
     episodes = [_recording(index, file) for index, file in enumerate(files)]
     common = set.intersection(*(set(episode.clips) for episode in episodes))
     if not common:

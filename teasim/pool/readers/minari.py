@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from teasim.common.errors import ConfigError, PoolError
-from teasim.pool.clips.hdf5 import opened
+from teasim.pool.clips.hdf5 import library, opened
 from teasim.pool.hdf5.facts import read_facts
+from teasim.pool.hdf5.guard import require_readable
 from teasim.pool.hdf5.logs import StoredLog, logs_of, observation_logs
 from teasim.pool.hdf5.pictures import arrays, clips_in, group, logs_hash
 from teasim.pool.readers.reader import Reader, ReadOptions
@@ -57,6 +58,8 @@ def open_folder(path: Path, options: ReadOptions) -> RecordedSource:
             "again with data_format='hdf5'."
         )
     place = folder / MAIN
+    library(place)
+    require_readable([place])
     with opened(place) as file:
         names = sorted(filter(EPISODE.fullmatch, file), key=lambda name: int(name[8:]))
         if not names:

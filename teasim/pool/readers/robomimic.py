@@ -13,6 +13,7 @@ import numpy as np
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool.clips.hdf5 import library, opened
 from teasim.pool.hdf5.facts import read_facts
+from teasim.pool.hdf5.guard import require_readable
 from teasim.pool.hdf5.logs import StoredLog, logs_of, observation_logs
 from teasim.pool.hdf5.pictures import arrays, clips_in, files_in, group, logs_hash
 from teasim.pool.readers import aloha, minari
@@ -46,6 +47,7 @@ def open_file(path: Path, options: ReadOptions) -> RecordedSource:
     if len(files) > 1:
         known = ", ".join(file.name for file in files)
         raise PoolError(f"'{path}' holds {len(files)} HDF5 files, {known}; name one of them.")
+    require_readable(files)
     (place,) = files
     with opened(place) as file:
         data = group(file, "data")
