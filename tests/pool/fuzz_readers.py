@@ -17,8 +17,8 @@ from teasim.pool.readers.registry import open_source
 from tests.pool import foreign_inputs as made
 
 MOST_SECONDS = 40.0
-"""Longest time of one case [s]; a sound source takes about 0.3 s, and a look at a damaged HDF5 file is
-stopped after 10 s (`teasim.pool.hdf5.guard`)."""
+"""Longest time of one case [s]; a sound source takes about 0.3 s, and a look at a damaged HDF5 file
+is stopped after 10 s (`teasim.pool.hdf5.guard`)."""
 MOST_BYTES = 400 * 2**20
 """Most memory that all cases may need beyond what a sound source needs."""
 
