@@ -149,7 +149,16 @@ def _judged(
             camera, z = cameras[chosen[kind][d]], float(exceeded[kind][d])
             one = evidence[camera][kind]
             said.append(MomentFinding(kind, camera, one.own[d], one.other[d], z**2 / 2))
-        said.sort(key=lambda finding: -finding.surprise)
-        grave = [finding for finding in said if finding.surprise >= NOTABLE**2 / 2]
-        findings.append(tuple(grave or said[:1]))
+        findings.append(_in_order(said))
     return MomentScore(losses_of(exceeded), exceeded, tuple(findings), found, structure)
+
+
+def _in_order(said: Sequence[MomentFinding]) -> tuple[MomentFinding, ...]:
+    """Return the notable findings, at least one, the most important one first.
+
+    A step that is missing has no effect either, so `ineffective` comes after a notable `missing`.
+    """
+    notable = {finding.kind for finding in said if finding.surprise >= NOTABLE**2 / 2}
+    implied = {"ineffective"} if "missing" in notable else set()
+    ordered = sorted(said, key=lambda finding: (finding.kind in implied, -finding.surprise))
+    return tuple(f for f in ordered if f.kind in notable) or tuple(ordered[:1])
