@@ -6,14 +6,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.vision.cache import default_folder
 from filtering.vision.frame_features import (
     CHUNK,
     FrameSource,
     FrameTask,
     clip_key,
+    frame_tasks,
     look_up_or_describe,
-    sample_count,
     sampled_frames,
 )
 from teasim.common.workers import Workers
@@ -37,16 +36,7 @@ def cell_pictures(
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
     """
-    (camera,) = source.cameras
-    tasks = [
-        FrameTask(
-            episode.clip(camera),
-            camera,
-            sample_count(episode.length, fps, source.rate),
-            default_folder(),
-        )
-        for episode in episodes
-    ]
+    tasks = frame_tasks(episodes, fps, source)
     found = look_up_or_describe(tasks, _key, describe_cells, workers)
     return [np.asarray(cells, dtype=np.uint8) for cells in found]
 

@@ -96,6 +96,22 @@ def moment_of_frames(length: int, count: int) -> NDArray[np.int64]:
     return np.searchsorted(edges, np.arange(length), side="right")
 
 
+def frame_tasks(
+    episodes: Sequence[Demonstration], fps: float, source: FrameSource
+) -> list[FrameTask]:
+    """Return a task per demonstration and camera, the cameras of a demonstration side by side."""
+    return [
+        FrameTask(
+            episode.clip(camera),
+            camera,
+            sample_count(episode.length, fps, source.rate),
+            default_folder(),
+        )
+        for episode in episodes
+        for camera in source.cameras
+    ]
+
+
 def frame_features(
     episodes: Sequence[Demonstration], fps: float, source: FrameSource, *, workers: Workers
 ) -> list[NDArray[np.float32]]:
@@ -110,16 +126,7 @@ def frame_features(
     Raises:
         PoolError: a video is missing or damaged, or there is no such camera.
     """
-    tasks = [
-        FrameTask(
-            episode.clip(camera),
-            camera,
-            sample_count(episode.length, fps, source.rate),
-            default_folder(),
-        )
-        for episode in episodes
-        for camera in source.cameras
-    ]
+    tasks = frame_tasks(episodes, fps, source)
     described = look_up_or_describe(tasks, _key, describe_moments, workers)
     return side_by_side(described, len(source.cameras))
 
