@@ -37,7 +37,7 @@ def main() -> int:
     parser.add_argument("--pools", type=int, default=10, help="number of pools; seeds 0, 1, ...")
     parser.add_argument("--seq1", type=int, default=10, help="correct demonstrations in each")
     parser.add_argument("--seq3", type=int, default=4, help="incorrect demonstrations in each")
-    parser.add_argument("--frames-per-segment", type=int, default=16)
+    parser.add_argument("--segmenter", default="auto", help="as in teasim filter")
     parser.add_argument("--jobs", type=int, default=default_jobs(), help="processes")
     arguments = parser.parse_args()
     worst = 0
@@ -58,7 +58,7 @@ def check(arguments: argparse.Namespace, seed: int) -> Counts:
         if finished
         else generate(root, config, workers=Workers(arguments.jobs)).pool
     )
-    settings = FilterConfig(frames_per_segment=arguments.frames_per_segment)
+    settings = FilterConfig(segmenter=arguments.segmenter)
     flagged = DemoFilter(settings).fit(pool, workers=Workers(arguments.jobs)).flagged_
     correct = [episode.record.correct for episode in pool.episodes if episode.record is not None]
     pairs = list(zip(flagged.tolist(), correct, strict=True))
