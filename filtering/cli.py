@@ -145,6 +145,8 @@ def basis(fitted: "DemoFilter") -> str:
     chosen, cameras = fitted.chosen_, ", ".join(fitted.cameras_)
     if chosen.score == "moments":
         return f"Judged by moments of the videos alone (camera {cameras})."
+    if chosen.score == "combined":
+        return f"Judged by moments and found sub-tasks of the videos alone (camera {cameras})."
     if chosen.segmenter == "logged":
         return "Judged by the logged sub-tasks."
     if chosen.segmenter == "predictions":

@@ -21,6 +21,8 @@ AUTO = "auto"
 """Name of the score and of the segmenter that are chosen by what the source holds."""
 MOMENTS = "moments"
 """Name of the score that needs no segments."""
+COMBINED = "combined"
+"""Name of the score of moments and the norm together."""
 AGREEMENT = "agreement"
 """Name of the segmenter that the score `moments` brings along."""
 
@@ -68,13 +70,16 @@ class FilterConfig(JudgingConfig):
     def for_source(self, source: Source) -> "FilterConfig":
         """Return these settings with `auto` replaced by what it stands for in a source.
 
-        Videos are judged by the score norm on sub-tasks that clustering finds in them; step lists
-        without videos on the predictions that are stored, or else on the logged labels. Moments
-        rank better in other tasks than tea, but accuse too many correct videos (docs/results.md).
+        Videos are judged by moments, and by the norm on sub-tasks that clustering finds in them;
+        with another segmenter by the norm alone; step lists without videos on the predictions that
+        are stored, or else on the logged labels.
         """
         score, segmenter = self.score, self.segmenter
-        if score == AUTO:
-            score = MOMENTS if segmenter == AGREEMENT else "norm"
+        if score == AUTO and segmenter == AGREEMENT:
+            score = MOMENTS
+        elif score == AUTO:
+            alone = source.cameras and segmenter in (AUTO, "clustering") and self._is_plain
+            score = COMBINED if alone else "norm"
         if segmenter == AUTO and score == MOMENTS:
             segmenter = AGREEMENT
         elif segmenter == AUTO and source.cameras:
@@ -82,6 +87,11 @@ class FilterConfig(JudgingConfig):
         elif segmenter == AUTO:
             segmenter = "predictions" if source.has_predictions else "logged"
         return replace(self, score=score, segmenter=segmenter)
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether no setting is given that the norm alone can follow."""
+        return self.decision == "clusters" and not self.tolerance and not self.precedence
 
     def _check_names(self) -> None:
         # Imported here because the registries need SciPy, which `--help` must not wait for.
@@ -97,7 +107,7 @@ class FilterConfig(JudgingConfig):
             raise ConfigError(
                 f"The segmenter '{AGREEMENT}' is for the score '{MOMENTS}'; choose another one."
             )
-        if self.score not in (AUTO, MOMENTS):
+        if self.score not in (AUTO, MOMENTS, COMBINED):
             judge_named(self.score)
         solver_named(self.solver)
         subtraction_named(self.background)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.config import AGREEMENT, MOMENTS, FilterConfig
+from filtering.config import AGREEMENT, COMBINED, MOMENTS, FilterConfig
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.features.config import POOLED
@@ -34,6 +34,7 @@ from teasim.pool.weight_table import WeightRow
 
 if TYPE_CHECKING:
     from filtering.judging.decision.decide import PoolDecision
+    from filtering.moments.score import MomentScore
 
 FEWEST_DEMOS = 3
 """Least number of demonstrations; fewer have no majority."""
@@ -140,7 +141,8 @@ from the whole video.
         require_sound(pool)
         self.chosen_ = self.config.for_source(pool)
         self.cameras_ = self._cameras(pool)
-        judge = self._by_moments if self.chosen_.score == MOMENTS else self._by_segments
+        judges = {MOMENTS: self._by_moments, COMBINED: self._by_both}
+        judge = judges.get(self.chosen_.score, self._by_segments)
         self._seen: set[str] = set()
         self._learn(judge(pool, workers), pool.fps)
         self.looked_at_ = tuple(camera for camera in pool.cameras if camera in self._seen)
@@ -188,31 +190,49 @@ from the whole video.
                 )
         return ()
 
+    def _by_both(self, pool: Source, workers: Workers) -> Judgement:
+        """Judge by sub-tasks and by moments; the graver verdict counts."""
+        from filtering.judging.combined import combine
+
+        by_moments, _ = self._moments(pool, workers)
+        by_segments = self._by_segments(pool, workers)
+        joined = combine(by_segments, by_moments, pool.fps, self.config.groups)
+        return self._cut(joined)
+
     def _by_moments(self, pool: Source, workers: Workers) -> Judgement:
         """Judge by counterparts between the videos; segments only serve to show."""
+        from filtering.segmentation.unlabelled.agreed import agreed_segments
+
+        judgement, score = self._moments(pool, workers, self.config.groups)
+        with self._timed("segments"):
+            if self.chosen_.segmenter == AGREEMENT:
+                lengths = [episode.length for episode in pool.episodes]
+                self.segments_ = agreed_segments(score.counterparts, lengths)
+            else:
+                self.segments_ = self._segments(pool, workers)
+        return self._cut(judgement)
+
+    def _moments(
+        self, pool: Source, workers: Workers, groups: str = "auto"
+    ) -> "tuple[Judgement, MomentScore]":
         # Imported here because step lists need neither torch nor videos.
         from filtering.judging.moments import Timeline, judge_moments
         from filtering.moments.score import look
-        from filtering.segmentation.unlabelled.agreed import agreed_segments
 
         self._seen.update(self.cameras_)
         with self._timed("features"):
             seen = look(pool, pool.episodes, self.cameras_, workers=workers)
         episodes = pool.episodes
         timeline = Timeline([e.length for e in episodes], [e.name for e in episodes], pool.fps)
-        with self._timed("weights"):
-            judgement, score = judge_moments(seen, timeline, self.config.groups)
-            if self.config.threshold != "auto":
-                grouping = group_weights(
-                    judgement.weights, self.config.groups, self.config.threshold
-                )
-                judgement = replace(judgement, grouping=grouping)
-        with self._timed("segments"):
-            if self.chosen_.segmenter == AGREEMENT:
-                self.segments_ = agreed_segments(score.counterparts, timeline.lengths)
-            else:
-                self.segments_ = self._segments(pool, workers)
-        return judgement
+        with self._timed("moments"):
+            return judge_moments(seen, timeline, groups)
+
+    def _cut(self, judgement: Judgement) -> Judgement:
+        """Apply a threshold that was asked for."""
+        if self.config.threshold == "auto":
+            return judgement
+        grouping = group_weights(judgement.weights, self.config.groups, self.config.threshold)
+        return replace(judgement, grouping=grouping)
 
     def _by_segments(self, pool: Source, workers: Workers) -> Judgement:
         """Judge by the sub-tasks and what is seen of them."""
@@ -222,7 +242,9 @@ from the whole video.
             evidence = self._evidence(pool, workers)
         # The matrices are small: several BLAS threads would only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
-            return judge_named(self.chosen_.score)(evidence, self.chosen_)
+            plain = replace(self.chosen_, score="norm", groups="auto", threshold="auto")
+            settings = plain if self.chosen_.score == COMBINED else self.chosen_
+            return judge_named(settings.score)(evidence, settings)
 
     def _segments(self, pool: Source, workers: Workers) -> Segmentation:
         chosen = self.chosen_
@@ -280,11 +302,12 @@ from the whole video.
         self.weights_ = judgement.weights
         self.losses_ = judgement.losses
         self.decision_ = judgement.decision
-        self.probabilities_ = (
-            probability_incorrect(judgement.losses)
-            if judgement.decision is None
-            else judgement.decision.probabilities
-        )
+        if judgement.probabilities is not None:
+            self.probabilities_ = judgement.probabilities
+        elif judgement.decision is not None:
+            self.probabilities_ = judgement.decision.probabilities
+        else:
+            self.probabilities_ = probability_incorrect(judgement.losses)
         self.trust_ = judgement.trust
         self.objective_ = judgement.objective
         self.groups_ = judgement.grouping.groups

@@ -29,7 +29,8 @@ class JudgingConfig:
     score: str = "auto"
     """What demonstrations are judged by: moments (where each moment of a video has its counterpart
     in the others; needs no sub-tasks), norm (omissions, order and next steps, compared with what
-    most of the pool does) or equation3 (the next-step model of the paper). auto: norm."""
+    most of the pool does), combined (the graver verdict of these two) or equation3 (the next-step
+    model of the paper). auto: combined for videos alone, or else norm."""
     groups: str = "auto"
     """Number of groups: auto (kept; with the score norm also out of order and steps left out), 1
     (nothing is flagged), 2 or 3."""

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from filtering.judging.explain import Clock, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.thresholds import Grouping, group_weights
-from filtering.moments.decision import CUT
 from filtering.moments.evidence import Stretch
 from filtering.moments.score import MomentFinding, MomentScore, score_moments
 from filtering.moments.vectors import Video
@@ -67,7 +66,7 @@ def judge_moments(
             demonstrations than groups.
     """
     score = score_moments(cameras)
-    weights = 1 / (1 + (score.losses / CUT) ** 2)
+    weights = 1 - score.probabilities
     grouping = _by_nature(score)
     if groups != "auto" and int(groups) != grouping.count:
         grouping = group_weights(weights, groups)
@@ -77,7 +76,15 @@ def judge_moments(
         for found in score.findings
     )
     reasons = tuple(reason(found[0], counts[found[0].camera], timeline) for found in score.findings)
-    judged = Judgement(score.losses, weights, grouping, weights, findings, reasons=reasons)
+    judged = Judgement(
+        score.losses,
+        weights,
+        grouping,
+        weights,
+        findings,
+        reasons=reasons,
+        probabilities=score.probabilities,
+    )
     return judged, score
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, Match
-from filtering.moments.evidence import FOUND, TINY
+from filtering.moments.evidence import TINY
+from filtering.moments.replaced import FOUND
 
 Array = NDArray[np.float64]
 

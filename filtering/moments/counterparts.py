@@ -48,6 +48,14 @@ class Counterparts:
     """[r][d]: the moments of video d found in reference r; None for itself."""
 
 
+def returned(there: Match, back: Match, slack: int) -> NDArray[np.bool_]:
+    """Return (n,): True for moments whose counterpart's counterpart is at most `slack` away.
+
+    A moment that looks like many others, such as a rest, does not return.
+    """
+    return np.asarray(np.abs(back.at[there.at] - np.arange(len(there.at))) <= slack)
+
+
 def find_counterparts(vectors: Sequence[Vectors]) -> Counterparts:
     """Find the counterparts, with directions weighed by agreement.
 
@@ -115,6 +123,5 @@ def _differences(vectors: Sequence[Vectors], found: Counterparts) -> Iterator[Ve
             there, back = found.there[r][d], found.back[r][d]
             assert there is not None
             assert back is not None
-            returned = np.abs(back.at[there.at] - np.arange(len(there.at))) <= ROUND_TRIP
-            mutual = returned & (there.near <= np.median(there.near))
+            mutual = returned(there, back, ROUND_TRIP) & (there.near <= np.median(there.near))
             yield vectors[r][mutual] - vectors[d][there.at[mutual]]

@@ -1,15 +1,16 @@
-"""From evidence of several kinds and cameras to one loss per demonstration, and a cut.
+"""From evidence of several kinds and cameras to one strength per demonstration, and a cut.
 
-Raw evidence is comparable within a pool, less so between pools: where people differ or orders are
-free, all of it is larger. So each kind counts by how far it lies above the median of the trusted
-demonstrations, in units of how much those scatter. In a small pool that scatter s is hardly known;
-TYPICAL, the scatter of usual videos in other pools, counts for as much as PRIOR demonstrations:
+Evidence counts by how far it lies above the median of the trusted demonstrations, in units of what
+is honest: SCALE, what usual videos reach in any pool, wider by the variety v of the orders of this
+pool, and how much its demonstrations scatter, s, because where people differ all of it is larger:
 
-    z = max(0, value - median) / sqrt((PRIOR TYPICAL^2 + T s^2) / (PRIOR + T)),
-    loss = 1/2 sum over kinds of z^2,
+    z_k      = max(0, value - median) / sqrt((SCALE_k (1 + FREE_k v))^2 + (SCATTER_k s_k)^2)
+    strength = (sum over kinds of z_k^3)^(1/3)
+    logit p  = STEEPNESS (strength - 1)
 
-the log-likelihood ratio of Gaussians [nats]. Everybody is trusted at first. Gross mistakes hide
-small ones, because what many do passes for variety; those whose loss is DISTRUST times the cut are
+A demonstration of strength 1 is as probably incorrect as correct. The exponent lets one clear kind
+of evidence outweigh several weak ones. Everybody is trusted at first. Gross mistakes hide small
+ones, because what many do passes for variety; those whose strength is DISTRUST or more are
 therefore trusted no longer, and what is usual, the evidence, median and scatter are found again
 from the others (`judge`). Of several cameras the most telling one counts for each kind; a camera
 that sees little, or moves, has a large scatter of its own and tells little.
@@ -17,9 +18,11 @@ that sees little, or moves, has a large scatter of its own and tells little.
 
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from filtering.moments.evidence import Trusted
 
@@ -27,66 +30,84 @@ Array = NDArray[np.float64]
 
 KINDS = ("missing", "order", "extra", "ineffective")
 """Kinds of evidence."""
-TYPICAL: Mapping[str, float] = MappingProxyType(
-    {"missing": 0.12, "order": 0.25, "extra": 0.13, "ineffective": 0.2}
+SCALE: Mapping[str, float] = MappingProxyType(
+    {"missing": 0.28, "order": 0.15, "extra": 0.38, "ineffective": 0.78}
 )
-"""Scatter of each kind among usual videos, of order that of its logarithm; chosen on tea-making
-and the scenes TUNED_ON (`scripts/check_scenes.py`), as are PRIOR, CUT and DISTRUST."""
-PRIOR = 20.0
-"""Demonstrations that TYPICAL counts for."""
-CUT = 12.0
-"""Loss above which a demonstration is flagged [nats]."""
-DISTRUST = 2.0
-"""Loss above which a demonstration does not say what is usual [CUT]. At 1, honest variety lost
-its rarest members one after the other."""
+"""Evidence of each kind above which a video is flagged in a pool without scatter and variety.
+Chosen with FREE and SCATTER on two pools of every kind of each scene TUNED_ON and on twenty of
+tea-making, as a compromise between mistakes found and correct videos accused
+(`scripts/check_scenes.py`)."""
+FREE: Mapping[str, float] = MappingProxyType(
+    {"missing": 2.0, "order": 6.0, "extra": 2.0, "ineffective": 2.0}
+)
+"""How much wider SCALE is where another order moves a step past the whole video; where orders are
+free, alignments err too, so that it concerns all kinds."""
+SCATTER: Mapping[str, float] = MappingProxyType(
+    {"missing": 1.5, "order": 2.0, "extra": 2.0, "ineffective": 0.5}
+)
+"""How much the scatter of a pool counts beside SCALE."""
+STEEPNESS = 5.0
+"""How fast the logit of the probability rises with the strength; of the size that a logistic
+regression on the same pools gives."""
+EXPONENT = 3
+"""Exponent with which kinds are summed."""
+DISTRUST = 1.3
+"""Strength from which a demonstration does not say what is usual. At 1, honest variety lost its
+rarest members one after the other."""
 MAD_TO_DEVIATION = 1.4826
 """Standard deviation of a Gaussian [median absolute deviation]."""
-ORDER_OFFSET = 0.3
-"""Added to the evidence of order before its logarithm is taken: small shifts are all alike."""
 ROUNDS = 3
 """Most times that trust is revised."""
 
 
+class Observed(NamedTuple):
+    """What one camera gives."""
+
+    values: Mapping[str, Array]
+    """Per kind (D,) its evidence against each demonstration."""
+    variety: float
+    """How far steps move from one trusted demonstration to another, see `evidence.variety_of`."""
+
+
 def judge(
-    evidence: Callable[[Trusted], Sequence[Mapping[str, Array]]], count: int
+    evidence: Callable[[Trusted], Sequence[Observed]], count: int
 ) -> tuple[Trusted, list[dict[str, Array]]]:
     """Find whom to trust; return it, (D,), and the exceedances per camera and kind, (D,) each.
 
     Trust once lost does not return, and is not taken from more than half of the demonstrations.
 
     Args:
-        evidence: returns the evidence of every kind per camera, (D,), once it is told whom to
-            trust.
+        evidence: returns what each camera gives, once it is told whom to trust.
         count: D, the number of demonstrations.
     """
     trusted = np.ones(count, dtype=np.bool_)
     for attempt in range(ROUNDS + 1):
         exceeded = [
-            {kind: exceedances(kind, values[kind], trusted) for kind in KINDS}
-            for values in evidence(trusted)
+            {kind: exceedances(kind, one, trusted) for kind in KINDS} for one in evidence(trusted)
         ]
-        losses = losses_of(most_telling(exceeded))
-        revised = trusted & (losses <= DISTRUST * CUT)
+        strengths = strengths_of(most_telling(exceeded))
+        revised = trusted & (strengths < DISTRUST)
         if attempt == ROUNDS or np.array_equal(revised, trusted) or 2 * revised.sum() < count:
             break
         trusted = revised
     return trusted, exceeded
 
 
-def exceedances(kind: str, values: Array, trusted: Trusted) -> Array:
+def exceedances(kind: str, observed: Observed, trusted: Trusted) -> Array:
     """Return (D,): z, how far evidence lies above what is usual among the trusted.
 
     Args:
         kind: one of KINDS.
-        values: (D,) its evidence against each demonstration.
+        observed: what a camera gives.
         trusted: (D,) True for those that say what is usual.
     """
-    comparable = np.log(values + ORDER_OFFSET) if kind == "order" else values
-    usual = comparable[trusted]
-    median, count = np.median(usual), len(usual)
-    scatter = MAD_TO_DEVIATION * np.median(np.abs(usual - median))
-    squared = PRIOR * TYPICAL[kind] ** 2 + count * scatter**2
-    return np.asarray(np.maximum(comparable - median, 0.0) / np.sqrt(squared / (PRIOR + count)))
+    values = observed.values[kind]
+    usual = values[trusted]
+    median = np.median(usual)
+    scatter = MAD_TO_DEVIATION * float(np.median(np.abs(usual - median)))
+    scale = SCALE[kind] * (1 + FREE[kind] * observed.variety)
+    honest = np.hypot(scale, SCATTER[kind] * scatter)
+    return np.asarray(np.maximum(values - median, 0.0) / honest)
 
 
 def most_telling(exceeded: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
@@ -99,6 +120,12 @@ def telling(cameras: Sequence[Array]) -> NDArray[np.int64]:
     return np.asarray(np.argmax(np.stack(cameras), axis=0))
 
 
-def losses_of(exceeded: Mapping[str, Array]) -> Array:
-    """Return (D,): losses [nats] from the exceedances of all kinds."""
-    return np.asarray(0.5 * np.sum([np.square(z) for z in exceeded.values()], axis=0))
+def strengths_of(exceeded: Mapping[str, Array]) -> Array:
+    """Return (D,): strengths from the exceedances of all kinds."""
+    powers = np.sum([z**EXPONENT for z in exceeded.values()], axis=0)
+    return np.asarray(powers ** (1 / EXPONENT))
+
+
+def probabilities_of(strengths: Array) -> Array:
+    """Return (D,): probability of being incorrect, one half at strength 1."""
+    return np.asarray(expit(STEEPNESS * (strengths - 1)))

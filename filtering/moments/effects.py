@@ -30,13 +30,25 @@ from filtering.moments.evidence import VARIETY, Evidence, Stretch, Trusted
 from filtering.moments.vectors import Video
 
 Array = NDArray[np.float64]
+Change = NDArray[np.float32]
+"""(H, W, 3) what each cell changes by, -255..255."""
 Amounts = NDArray[np.float32]
 """(..., C) how much of a usual change is there, 0..255."""
-States = NDArray[np.float16]
+States = NDArray[np.float32]
 """(n, H, W, 3) what lies where, hands and arms taken out."""
 
 REACH = 8
 """Moments before and after which the picture is compared; those of `windows.REACH`."""
+LATER = 2
+"""How much farther before and after it is looked whether a change lasts [REACH]."""
+LASTING_SHARE = 0.5
+"""Share of a change that must still be there farther on: what an arm covers for a while is no
+effect."""
+DOUBTFUL = 6
+"""Moments by which the counterpart of a counterpart may miss where it began, or else nothing is
+said about the change."""
+MOST = 255.0
+"""Largest change of a cell, 0..255."""
 STRIDE = 2
 """Every second moment is looked at."""
 OBSERVERS = 3
@@ -75,10 +87,10 @@ class Usual:
     """(C,) rows of the cells that change."""
     columns: NDArray[np.int64]
     """(C,) their columns."""
-    directions: Array
+    directions: Change
     """(C, 3) colour direction in which each changes, of length 1."""
 
-    def amounts(self, change: Array) -> Amounts:
+    def amounts(self, change: Change) -> Amounts:
         """Return (C,): how much of it a change (H, W, 3) shows."""
         reach = range(-NEIGHBOURHOOD, NEIGHBOURHOOD + 1)
         height, width = change.shape[:2]
@@ -130,9 +142,7 @@ def observe(found: Counterparts, videos: Sequence[Video]) -> list[View]:
     for d, video in enumerate(videos):
         own = states[d] if d in states else states_of(video)
         for row, changes in usual.items():
-            amounts[row].append(
-                [u.amounts(change_at(own, _place(found, row, d, u.moment))) for u in changes]
-            )
+            amounts[row].append([_amounts(u, own, found, row, d) for u in changes])
     return [
         View(row, tuple(changes), tuple(map(np.stack, zip(*amounts[row], strict=True))))
         for row, changes in usual.items()
@@ -149,35 +159,81 @@ def states_of(video: Video) -> States:
     blurred = np.stack([cv2.GaussianBlur(image, (0, 0), BLUR) for image in cells])
     padded = np.pad(blurred, ((STILL, STILL), (0, 0), (0, 0), (0, 0)), mode="edge")
     shifted = [padded[shift : shift + len(cells)] for shift in range(2 * STILL + 1)]
-    return np.median(shifted, axis=0).astype(np.float16)
+    return np.median(shifted, axis=0).astype(np.float32)
 
 
-def change_at(states: States, moment: int) -> Array:
-    """Return (H, W, 3): what is there after a moment minus what was there before."""
-    after = states[min(moment + REACH, len(states) - 1)].astype(np.float64)
-    return np.asarray(after - states[max(moment - REACH, 0)])
+def change_at(states: States, before: int, after: int) -> Change:
+    """Return (H, W, 3): what is there at the moment `after` minus what was there `before`."""
+    last = len(states) - 1
+    return np.asarray(states[min(after, last)] - states[max(before, 0)])
 
 
-def usual_change(moment: int, changes: Array) -> Usual | None:
-    """Return what most videos change, from their changes (D, H, W, 3); None if that is little."""
-    median = np.median(changes, axis=0)
+def usual_change(moment: int, changes: Change, later: Change) -> Usual | None:
+    """Return what most videos change, and do not change back; None if that is little.
+
+    Args:
+        moment: the moment of the reference.
+        changes: (D, H, W, 3) changes of the videos about it.
+        later: (D, H, W, 3) their changes between moments farther before and after.
+    """
+    median, lasting = np.median(changes, axis=0), np.median(later, axis=0)
     sizes = np.linalg.norm(median, axis=-1)
+    lasts = (median * lasting).sum(axis=-1) >= LASTING_SHARE * np.square(sizes)
+    sizes = np.where(lasts, sizes, 0.0)
     flat = np.argsort(-sizes.ravel(), kind="stable")[:MOST_CELLS]
     flat = flat[sizes.ravel()[flat] >= LEAST_CHANGE]
     if len(flat) < CELLS:
         return None
     rows, columns = np.unravel_index(flat, sizes.shape)
-    return Usual(moment, rows, columns, median[rows, columns] / sizes[rows, columns][:, None])
+    directions = median[rows, columns] / sizes[rows, columns][:, None]
+    return Usual(moment, rows, columns, directions.astype(np.float32))
 
 
 def _usual_changes(found: Counterparts, row: int, states: Mapping[int, States]) -> list[Usual]:
     usual = []
     for moment in range(0, found.lengths[found.references[row]], STRIDE):
-        changes = [change_at(own, _place(found, row, k, moment)) for k, own in states.items()]
-        known = usual_change(moment, np.stack(changes))
+        changes = [_change(own, found, row, k, moment) for k, own in states.items()]
+        later = [
+            change_at(own, *_around(found, row, k, moment, LATER * REACH))
+            for k, own in states.items()
+        ]
+        known = usual_change(moment, np.stack(changes), np.stack(later))
         if known is not None:
             usual.append(known)
     return usual
+
+
+def _amounts(usual: Usual, own: States, found: Counterparts, row: int, d: int) -> Amounts:
+    """Return (C,): the most of a change that a video shows over the spans that are looked at.
+
+    What comes a little sooner or later than elsewhere, or while a hand covers it, is not lacking;
+    nor is it where the counterpart is doubtful.
+    """
+    if not _leads_back(found, row, d, usual.moment):
+        return np.full(len(usual.rows), MOST, dtype=np.float32)
+    at = _place(found, row, d, usual.moment)
+    before, after = _around(found, row, d, usual.moment, LATER * REACH)
+    spans = [(b, a) for b in (at - REACH, before) for a in (at + REACH, after)]
+    return np.asarray(np.max([usual.amounts(change_at(own, *span)) for span in spans], axis=0))
+
+
+def _leads_back(found: Counterparts, row: int, d: int, moment: int) -> bool:
+    there, back = found.there[row][d], found.back[row][d]
+    if there is None or back is None:
+        return True
+    return bool(abs(back.at[there.at[moment]] - moment) <= DOUBTFUL)
+
+
+def _change(own: States, found: Counterparts, row: int, d: int, moment: int) -> Change:
+    at = _place(found, row, d, moment)
+    return change_at(own, at - REACH, at + REACH)
+
+
+def _around(found: Counterparts, row: int, d: int, moment: int, reach: int) -> tuple[int, int]:
+    """Return the counterparts in d of the moments `reach` before and after one of the reference."""
+    last = found.lengths[found.references[row]] - 1
+    before, after = max(moment - reach, 0), min(moment + reach, last)
+    return _place(found, row, d, before), _place(found, row, d, after)
 
 
 def _share_lacking(amounts: Amounts, trusted: Trusted) -> Array:

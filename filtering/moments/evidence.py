@@ -1,17 +1,19 @@
 """What counterparts say against a demonstration: a stretch is missing, out of order or extra.
 
 With near_rd(t) the distance of the counterpart in video d of moment t of reference r, at_rd(t) its
-place, and Q_k the quantile 1 - VARIETY over the other references k, trusted ones alone:
+place, moved_rd(t) the share of the video that it has passed, and Q_k the quantile 1 - VARIETY over
+the other references k, trusted ones alone:
 
     missing    log near_rd(t) - Q_k log near_rk(t)
-    order      |at_rd(t) - m(t)| / (Q_k |at_rk(t) - m(t)| + 0.02)      m(t) = median_k at_rk(t)
+    order      moved_rd(t) - Q_k moved_rk(t)
     extra      log near_dr(t) - median_k log near_rk(at_dr(t))         of moments t of d itself
 
-Order counts only where the counterpart is no farther than is usual. What a share VARIETY of the
-videos does, an optional step left out or another legal order, is thus never evidence. Each curve is
-summed up by the mean of its largest twelfth over t, because a step is a part of a video; missing
-and order by the median over the references, because a reference may be incorrect too; extra by the
-quantile VARIETY.
+Order counts only where the counterpart of the counterpart is the moment itself: rests look all
+alike. What a share VARIETY of the videos does, an optional step left out or another legal order, is
+thus never evidence. Each curve is summed up by the mean of its largest twelfth over t, because a
+step is a part of a video; missing and order by the median over the references, because a reference
+may be incorrect too; extra by the quantile SHARED. Missing and extra count less the more of the
+stretch is replaced, see `replaced`.
 """
 
 from collections.abc import Sequence
@@ -20,7 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import Counterparts
+from filtering.moments.counterparts import ROUND_TRIP, Counterparts, returned
+from filtering.moments.replaced import Side, replaced
 
 Array = NDArray[np.float64]
 Trusted = NDArray[np.bool_]
@@ -28,12 +31,16 @@ Trusted = NDArray[np.bool_]
 
 VARIETY = 0.3
 """Share of the trusted videos that makes a behaviour one of several usual ones."""
+RECOGNISED = 1.2
+"""Largest log of how much farther than usual a counterpart may be for its place to count: what is
+done at another place is done among other things."""
+SHARED = 0.2
+"""Share of the trusted videos that makes a step one of the task: one that fewer show is extra."""
+MOST_PAIRS = 0.6
+"""Share of the pairs of demonstrations by which it is told how free orders are: in a pool of ten
+demonstrations of one order and four of another, 0.56 of the pairs agree."""
 WORST = 12
 """The worst 1 / WORST of a video counts."""
-FOUND = float(np.log(1.3))
-"""Largest log of how much farther than usual a counterpart may be to count as found."""
-PLACE_NOISE = 0.02
-"""Scatter of places that is always allowed for [length of the video]."""
 TINY = 1e-6
 """Keeps logarithms finite where two videos are the same."""
 
@@ -62,47 +69,57 @@ class Evidence:
     """Per demonstration where in another video that which it is about is seen."""
 
 
-def missing_and_order(found: Counterparts, trusted: Trusted) -> tuple[Evidence, Evidence]:
-    """Return the evidence that stretches of the trusted references are missing, or out of order."""
-    curves = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
-    missing, order = [], []
-    for d in range(len(found.lengths)):
-        rows = [c for c in curves if c.number != d]
-        pairs = [c.departures(d) for c in rows]
-        missing.append(_middle([lack for lack, _ in pairs], rows, d))
-        order.append(_middle([shift for _, shift in pairs], rows, d))
-    return _evidence(missing), _evidence(order)
+def missing_order_extra(
+    found: Counterparts, trusted: Trusted
+) -> tuple[Evidence, Evidence, Evidence]:
+    """Return the evidence of the three kinds, in the order of the name.
+
+    Args:
+        found: the counterparts.
+        trusted: (D,) True for the demonstrations that say what is usual.
+    """
+    references = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
+    results = [
+        _Comparison([r for r in references if r.number != d], d) for d in range(len(found.lengths))
+    ]
+    return (
+        _evidence([one.missing() for one in results]),
+        _evidence([one.order() for one in results]),
+        _evidence([one.extra() for one in results]),
+    )
 
 
-def extra(found: Counterparts, trusted: Trusted) -> Evidence:
-    """Return the evidence that stretches of a demonstration are in no trusted reference."""
-    usual = {row: _Reference(found, row, trusted).usual for row in rows_of(found, trusted)}
-    results = []
-    for d in range(len(found.lengths)):
-        rows = [row for row in usual if found.references[row] != d]
-        matches = [found.back[row][d] for row in rows]
-        curves = np.stack(
-            [
-                np.log(match.near + TINY) - usual[row][match.at]
-                for row, match in zip(rows, matches, strict=True)
-                if match is not None
-            ]
-        )
-        curve = np.quantile(curves, VARIETY, axis=0)
-        start, stop = peak(curve)
-        nearest = int(curves[:, start:stop].mean(axis=1).argmin())
-        match = matches[nearest]
-        assert match is not None
-        places = match.at[start:stop]
-        other = Stretch(found.references[rows[nearest]], int(places.min()), int(places.max()) + 1)
-        results.append((worst(curve), Stretch(d, start, stop), other))
-    return _evidence(results)
+def variety_of(found: Counterparts, trusted: Trusted) -> float:
+    """Return how far steps move from one trusted demonstration to another [length of a video].
+
+    It is 0 while most pairs of demonstrations keep one order.
+    """
+    references = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
+    return float(np.quantile([far for r in references for far in r.moves()], MOST_PAIRS))
 
 
 def rows_of(found: Counterparts, trusted: Trusted) -> list[int]:
     """Return the rows of the trusted references; of all where fewer than two are trusted."""
     rows = [row for row, r in enumerate(found.references) if trusted[r]]
     return rows if len(rows) >= 2 else list(range(len(found.references)))
+
+
+def moved(at: NDArray[np.int64], sure: NDArray[np.bool_]) -> Array:
+    """Return (n,): the share of a video that each moment has passed in the other video.
+
+    That are the moments that came before it and come after it in the other, or the other way round.
+    Tempo, rests and what is left out elsewhere change nothing about it.
+
+    Args:
+        at: (n,) counterparts of the moments.
+        sure: (n,) True for counterparts that count; others are passed by nobody and pass nobody.
+    """
+    moments = np.arange(len(at))
+    earlier = moments[:, None] < moments[None, :]
+    later = at[:, None] > at[None, :] + ROUND_TRIP
+    passed = (earlier & later & sure[:, None]).sum(axis=0)
+    passing = (earlier & later & sure[None, :]).sum(axis=1)
+    return np.where(sure, (passed + passing) / len(at), 0.0)
 
 
 def worst(curve: NDArray[np.floating]) -> float:
@@ -131,19 +148,13 @@ class _Reference:
 
     def __init__(self, found: Counterparts, row: int, trusted: Trusted) -> None:
         self.number = found.references[row]
-        self._matches = found.there[row]
+        self._matches, self._back = found.there[row], found.back[row]
         others = [found.references[other] for other in rows_of(found, trusted)]
         self._others = [k for k in others if k != self.number]
         matches = [self._matches[k] for k in self._others]
         self._nears = np.stack([np.log(m.near + TINY) for m in matches if m is not None])
-        self._lengths = found.lengths
-        self._places = np.stack(
-            [self._place(k, m.at) for k, m in zip(self._others, matches, strict=True) if m]
-        )
         self.usual: Array = np.median(self._nears, axis=0)
-
-    def _place(self, video: int, at: NDArray[np.int64]) -> Array:
-        return np.asarray(at / self._lengths[video])
+        self._moved = np.stack([self._moved_in(k) for k in self._others])
 
     def departures(self, d: int) -> tuple[Array, Array]:
         """Return (n,), (n,): how much farther than usual, and how much displaced, d shows it."""
@@ -151,11 +162,19 @@ class _Reference:
         assert match is not None
         kept = [row for row, k in enumerate(self._others) if k != d] or [0]
         lack = np.log(match.near + TINY) - np.quantile(self._nears[kept], 1 - VARIETY, axis=0)
-        places = self._places[kept]
-        middle = np.median(places, axis=0)
-        scatter = np.quantile(np.abs(places - middle), 1 - VARIETY, axis=0) + PLACE_NOISE
-        shift = np.abs(self._place(d, match.at) - middle) / scatter
-        return lack, np.where(lack < FOUND, shift, 0.0)
+        usual = np.quantile(self._moved[kept], 1 - VARIETY, axis=0)
+        return lack, np.maximum(self._moved_in(d) - usual, 0.0)
+
+    def _moved_in(self, d: int) -> Array:
+        match, back = self._matches[d], self._back[d]
+        assert match is not None
+        assert back is not None
+        near = np.log(match.near + TINY) - self.usual < RECOGNISED
+        return moved(match.at, near & returned(match, back, ROUND_TRIP))
+
+    def moves(self) -> list[float]:
+        """Return how far steps move in each other trusted demonstration."""
+        return [worst(moved) for moved in self._moved]
 
     def at(self, d: int) -> NDArray[np.int64]:
         """Return (n,): the counterparts in d."""
@@ -163,19 +182,61 @@ class _Reference:
         assert match is not None
         return match.at
 
+    def back(self, d: int) -> Side:
+        """Return how much farther than usual the moments of d have their counterparts here."""
+        match = self._back[d]
+        assert match is not None
+        return Side(np.log(match.near + TINY) - self.usual[match.at], match.at)
+
 
 _Result = tuple[float, Stretch, Stretch]
 
 
-def _middle(curves: Sequence[Array], rows: Sequence[_Reference], d: int) -> _Result:
-    """Sum up the curves of all references; the places are those of the median one."""
-    values = [worst(curve) for curve in curves]
-    chosen = int(np.argsort(values, kind="stable")[len(values) // 2])
-    start, stop = peak(curves[chosen])
-    places = np.sort(rows[chosen].at(d)[start:stop])
-    low, high = np.quantile(places, (0.25, 0.75)).astype(int)
-    own = Stretch(d, int(low), int(high) + 1)
-    return float(np.median(values)), own, Stretch(rows[chosen].number, start, stop)
+class _Comparison:
+    """A demonstration compared with all references."""
+
+    def __init__(self, references: Sequence[_Reference], d: int) -> None:
+        self._references, self._d = references, d
+        pairs = [reference.departures(d) for reference in references]
+        self._lacks, self._shifts = [lack for lack, _ in pairs], [shift for _, shift in pairs]
+        self._sides = [reference.back(d) for reference in references]
+        self._curve: Array = np.quantile([side.curve for side in self._sides], SHARED, axis=0)
+
+    def missing(self) -> _Result:
+        values = [
+            less(worst(lack), replaced(Side(lack, r.at(self._d)), self._curve, *peak(lack)))
+            for r, lack in zip(self._references, self._lacks, strict=True)
+        ]
+        return self._middle(values, self._lacks)
+
+    def order(self) -> _Result:
+        return self._middle([worst(shift) for shift in self._shifts], self._shifts)
+
+    def extra(self) -> _Result:
+        start, stop = peak(self._curve)
+        shares = [
+            replaced(Side(self._curve, side.at), lack, start, stop)
+            for side, lack in zip(self._sides, self._lacks, strict=True)
+        ]
+        value = less(worst(self._curve), float(np.median(shares)))
+        nearest = int(np.argmin([side.curve[start:stop].mean() for side in self._sides]))
+        places = self._sides[nearest].at[start:stop]
+        other = Stretch(self._references[nearest].number, int(places.min()), int(places.max()) + 1)
+        return value, Stretch(self._d, start, stop), other
+
+    def _middle(self, values: Sequence[float], curves: Sequence[Array]) -> _Result:
+        """Sum up the values of all references; the places are those of the median one."""
+        chosen = int(np.argsort(values, kind="stable")[len(values) // 2])
+        start, stop = peak(curves[chosen])
+        places = np.sort(self._references[chosen].at(self._d)[start:stop])
+        low, high = np.quantile(places, (0.25, 0.75)).astype(int)
+        own = Stretch(self._d, int(low), int(high) + 1)
+        return float(np.median(values)), own, Stretch(self._references[chosen].number, start, stop)
+
+
+def less(value: float, share: float) -> float:
+    """Return evidence about a stretch of which a share is replaced."""
+    return value * (1 - share) if value > 0 else value
 
 
 def _evidence(results: Sequence[_Result]) -> Evidence:

@@ -9,9 +9,18 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.moments.cells import cell_pictures
 from filtering.moments.counterparts import Counterparts, find_counterparts
-from filtering.moments.decision import CUT, KINDS, judge, losses_of, most_telling, telling
+from filtering.moments.decision import (
+    KINDS,
+    STEEPNESS,
+    Observed,
+    judge,
+    most_telling,
+    probabilities_of,
+    strengths_of,
+    telling,
+)
 from filtering.moments.effects import View, ineffective, observe
-from filtering.moments.evidence import Evidence, Stretch, Trusted, extra, missing_and_order
+from filtering.moments.evidence import Evidence, Stretch, Trusted, missing_order_extra, variety_of
 from filtering.moments.suitable import (
     LEAST_RETURN,
     check_videos,
@@ -27,8 +36,9 @@ from teasim.pool.source import Demonstration, Source
 
 RATE = 5.0
 """Moments looked at per second [Hz]."""
-NOTABLE = 3.0
-"""Exceedance from which a kind of evidence is a finding, unless there is no larger one."""
+NOTABLE = 0.6
+"""Exceedance from which a kind of evidence is a finding, unless there is no larger one; kinds of
+less do not make a strength of 1 together with another that is not larger."""
 
 Array = NDArray[np.float64]
 
@@ -45,18 +55,23 @@ class MomentFinding:
     """Where in the demonstration: the stretch itself, or where what is missing was expected."""
     other: Stretch
     """The same stretch in another video, where it is as usual."""
-    surprise: float
-    """What it adds to the loss [nats]."""
+    exceedance: float
+    """How far it lies above what is usual, 1 at the cut."""
+
+    @property
+    def surprise(self) -> float:
+        """How improbable it is among correct demonstrations [nats]."""
+        return STEEPNESS * self.exceedance
 
 
 @dataclass(frozen=True)
 class MomentScore:
     """What moments say about D demonstrations."""
 
-    losses: Array
-    """(D,) [nats], higher is worse."""
+    strengths: Array
+    """(D,) strength of all evidence, 1 at the cut."""
     exceeded: Mapping[str, Array]
-    """Per kind (D,) how far its evidence lies above what is usual [standard deviations]."""
+    """Per kind (D,) how far its evidence lies above what is usual, 1 at the cut."""
     findings: tuple[tuple[MomentFinding, ...], ...]
     """Per demonstration what speaks against it, the gravest first."""
     counterparts: Mapping[str, Counterparts]
@@ -65,9 +80,19 @@ class MomentScore:
     """Per camera how much the videos have in common, see `suitable.shared_structure`."""
 
     @property
+    def probabilities(self) -> Array:
+        """(D,) probability of being incorrect."""
+        return probabilities_of(self.strengths)
+
+    @property
+    def losses(self) -> Array:
+        """(D,) -log of the probability of being correct [nats]."""
+        return np.asarray(np.logaddexp(0.0, STEEPNESS * (self.strengths - 1)))
+
+    @property
     def flagged(self) -> NDArray[np.bool_]:
-        """(D,) True where the loss is above the cut."""
-        return self.losses > CUT
+        """(D,) True where the strength is above the cut."""
+        return self.strengths > 1
 
 
 def look(
@@ -121,8 +146,7 @@ def score_moments(cameras: Mapping[str, Sequence[Video]]) -> MomentScore:
 
 def gather(found: Counterparts, views: Sequence[View], trusted: Trusted) -> dict[str, Evidence]:
     """Return the evidence of every kind that one camera gives, measured by the trusted."""
-    missing, order = missing_and_order(found, trusted)
-    kinds = (missing, order, extra(found, trusted), ineffective(found, views, trusted))
+    kinds = (*missing_order_extra(found, trusted), ineffective(found, views, trusted))
     return dict(zip(KINDS, kinds, strict=True))
 
 
@@ -135,9 +159,14 @@ def _judged(
     cameras = list(found)
     evidence: dict[str, dict[str, Evidence]] = {}
 
-    def values(trusted: Trusted) -> list[dict[str, Array]]:
+    def values(trusted: Trusted) -> list[Observed]:
         evidence.update({c: gather(found[c], views[c], trusted) for c in cameras})
-        return [{kind: evidence[c][kind].values for kind in KINDS} for c in cameras]
+        return [
+            Observed(
+                {kind: evidence[c][kind].values for kind in KINDS}, variety_of(found[c], trusted)
+            )
+            for c in cameras
+        ]
 
     _, each = judge(values, len(next(iter(found.values())).lengths))
     exceeded = most_telling(each)
@@ -148,9 +177,9 @@ def _judged(
         for kind in KINDS:
             camera, z = cameras[chosen[kind][d]], float(exceeded[kind][d])
             one = evidence[camera][kind]
-            said.append(MomentFinding(kind, camera, one.own[d], one.other[d], z**2 / 2))
+            said.append(MomentFinding(kind, camera, one.own[d], one.other[d], z))
         findings.append(_in_order(said))
-    return MomentScore(losses_of(exceeded), exceeded, tuple(findings), found, structure)
+    return MomentScore(strengths_of(exceeded), exceeded, tuple(findings), found, structure)
 
 
 def _in_order(said: Sequence[MomentFinding]) -> tuple[MomentFinding, ...]:
@@ -158,7 +187,7 @@ def _in_order(said: Sequence[MomentFinding]) -> tuple[MomentFinding, ...]:
 
     A step that is missing has no effect either, so `ineffective` comes after a notable `missing`.
     """
-    notable = {finding.kind for finding in said if finding.surprise >= NOTABLE**2 / 2}
+    notable = {finding.kind for finding in said if finding.exceedance >= NOTABLE}
     implied = {"ineffective"} if "missing" in notable else set()
-    ordered = sorted(said, key=lambda finding: (finding.kind in implied, -finding.surprise))
+    ordered = sorted(said, key=lambda finding: (finding.kind in implied, -finding.exceedance))
     return tuple(f for f in ordered if f.kind in notable) or tuple(ordered[:1])
