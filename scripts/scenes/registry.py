@@ -1,6 +1,7 @@
 """The scenes. Half of them are kept back: no choice is made by what a filter does on them."""
 
 from scenes import bench, conveyor, hands, panel, pour, squares, stack, tabletop
+from scenes.held_back import salad
 from scenes.scene import Scene
 
 TUNED_ON: tuple[Scene, ...] = (squares.SCENE, tabletop.SCENE, hands.SCENE, conveyor.SCENE)
