@@ -4,6 +4,7 @@ Boxes in space are drawn in perspective, the farther ones first; lengths are in 
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -149,16 +150,16 @@ class Assembly:
         follow = FOLLOWS * (self.hand - HOME)
         eyes = {
             "front": Eye(np.array([0.0, -22.0, 21.0]) + self.stand, AIM + [0, 1.4, 1], 165),
-            "wrist": Eye(
-                np.array([9.0, 7.0, 22.0]) + follow, AIM + 0.6 * follow * [1, 1, 0], 130
-            ),
+            "wrist": Eye(np.array([9.0, 7.0, 22.0]) + follow, AIM + 0.6 * follow * [1, 1, 0], 130),
         }
         return {name: self.films[name].take(self._draw(eye)) for name, eye in eyes.items()}
 
     def _draw(self, eye: Eye) -> np.ndarray:
         canvas = Canvas(BACKGROUND)
         self.clutter.draw(canvas)
-        mat = np.array([[-6.2, -4.6, 0], [6.2, -4.6, 0], [6.2, 4.6, 0], [-6.2, 4.6, 0]]) + self.origin
+        mat = (
+            np.array([[-6.2, -4.6, 0], [6.2, -4.6, 0], [6.2, 4.6, 0], [-6.2, 4.6, 0]]) + self.origin
+        )
         canvas.polygon(eye.see(mat), (72, 84, 96))
         tray = np.array([[8.6, 2, 0], [13.5, 2, 0], [13.5, 10, 0], [8.6, 10, 0]])
         canvas.polygon(eye.see(tray), (100, 92, 84))
@@ -196,7 +197,12 @@ class Assembly:
             self._solid(canvas, eye, at + [0.7, 0, 0.05], (0.7, 0.7, 0.5), (210, 50, 45))
 
     def _solid(
-        self, canvas: Canvas, eye: Eye, at: Point, half: Sequence[float], colour: Colour
+        self,
+        canvas: Canvas,
+        eye: Eye,
+        at: Point,
+        half: Sequence[float] | np.ndarray,
+        colour: Colour,
     ) -> None:
         """Draw the top and the two walls of a box that the camera sees."""
         near = np.array([*np.sign((eye.place - at)[:2]), 1.0])
@@ -224,9 +230,11 @@ class Assembly:
             points = CABLE + self.origin
         else:
             middle = self.stores["cable"] if self.cable is None else self.cable
-            points = middle + np.array([[-1.6, 0.5, 0], [-0.5, -0.6, 0], [0.6, 0.6, 0], [1.6, 0, 0]])
+            points = middle + np.array(
+                [[-1.6, 0.5, 0], [-0.5, -0.6, 0], [0.6, 0.6, 0], [1.6, 0, 0]]
+            )
         seen = eye.see(points)
-        for start, stop in zip(seen[:-1], seen[1:], strict=True):
+        for start, stop in pairwise(seen):
             canvas.line(start, stop, 3, (235, 130, 30))
 
     def _driver(self, canvas: Canvas, eye: Eye, tip: Point, way: Point) -> None:

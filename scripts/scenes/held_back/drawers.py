@@ -9,7 +9,7 @@ from scenes.scene import Scene
 FRAME = """
 <mujoco>
   <visual><quality shadowsize="0" offsamples="0"/>
-    <headlight ambient=".45 .45 .45" diffuse=".3 .3 .3"/></visual>
+    <headlight ambient=".5 .5 .5" diffuse=".4 .4 .4"/></visual>
   <asset>
     <texture name="t" type="2d" builtin="gradient" rgb1=".5 .56 .57" rgb2=".42 .49 .52" width="32"
       height="32" mark="random" markrgb=".45 .5 .52" random=".1"/>

@@ -1,4 +1,4 @@
-"""Gloved hands fill a tube, cap it and spin it in a centrifuge, from the side, in changing light."""
+"""Gloved hands fill a tube, cap it and spin it in a centrifuge, from the side in changing light."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from scenes.parts.drawing import Canvas, Film, Look, Point, along, smooth, table
 from scenes.parts.people import Clutter, Daylight, colour_of, draw_arm
 from scenes.scene import Scene
 
-BACKGROUND = table(120, 160, (182, 190, 196), 8)
+BACKGROUND = table(120, 160, (158, 168, 176), 8)
 TUBE = np.array([74.0, 84.0])
 LIQUIDS = {"sample": (60, 95, 225), "reagent": (245, 205, 40), "dye": (205, 40, 150)}
 BOTTLES = {
@@ -38,11 +38,11 @@ class Lab:
         self.drop: str | None = None
         self.left_handed = rng.random() < LEFT_SHARE
         self.turning = 0.0
-        glove = ((70, 110, 190), (150, 90, 190), (225, 225, 220))[rng.integers(3)]
-        self.colours = ((236, 238, 240), glove)
+        glove = ((70, 110, 190), (150, 90, 190), (60, 150, 150))[rng.integers(3)]
+        self.colours = ((206, 210, 216), glove)
         self.clutter = Clutter(np.array([[24.0, 20.0], [96, 26], [150, 20]]), 5, rng)
-        self.light = Daylight(0.25, rng)
-        self.film = Film(Look(light=0.2, drift=0.12, shake=0.3), rng)
+        self.light = Daylight(0.2, rng)
+        self.film = Film(Look(light=0.14, drift=0.12, shake=0.3), rng)
         self.rng = rng
         self.rest()
 
@@ -178,7 +178,7 @@ class Lab:
         canvas.box(middle + [11, 17], (22, 4), (205, 120, 50))
 
     def _tube(self, canvas: Canvas, at: Point) -> None:
-        canvas.box(at, (6.5, 16), (240, 244, 244))
+        canvas.box(at, (6.5, 16), (222, 228, 230))
         blend = sum(self.filled[name] * np.array(LIQUIDS[name]) for name in LIQUIDS)
         blend = blend / max(sum(self.filled.values()), 1e-6)
         green = np.array([40, 160, 80]) if self.filled["sample"] * self.filled["reagent"] else blend
@@ -203,7 +203,7 @@ class Lab:
     def _centrifuge(self, canvas: Canvas) -> None:
         if self.at == "rotor" and "tube" not in self.held:
             self._tube(canvas, ROTOR + [0, -2])
-        canvas.box(ROTOR + [0, 12], (22, 18), (215, 216, 210))
+        canvas.box(ROTOR + [0, 12], (22, 18), (196, 198, 194))
         angle = 1.5 * self.lid
         hinge, way = ROTOR + [22, -8], np.array([-np.cos(angle), -np.sin(angle)])
         if self.lid < 0.5:

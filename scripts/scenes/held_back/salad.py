@@ -29,6 +29,7 @@ COLOURS = {
 }
 PIECES = 8  # of each ingredient in the bowl
 SCOOPED = {"leaves": "lettuce", "rounds": "cucumber"}
+CUTS = {"lettuce": "tear", "cucumber": "slice"}
 
 
 class Salad:
@@ -172,9 +173,13 @@ class Salad:
     def _bowl(self, canvas: Canvas) -> None:
         canvas.disc(BOWL, 26, (70, 110, 150))
         canvas.disc(BOWL, 23, (215, 222, 228))
+        inside = [food for food, at in self.where.items() if at == "bowl"]
+        whole = [food for food in inside if self.state.get(CUTS.get(food, ""), 1.0) == 0]
+        for food in whole:
+            self._food(canvas, food, BOWL + self.heaps[food].mean(axis=0) / 2)
         for number in range(PIECES):
-            for food, at in self.where.items():
-                if at == "bowl":
+            for food in inside:
+                if food not in whole:
                     heap, mixed = self.heaps[food][number], self.mixed[food][number]
                     self._piece(canvas, food, BOWL + heap + self.mix[food] * (mixed - heap))
         for number in range(round(12 * self.state["oil"])):

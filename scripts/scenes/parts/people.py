@@ -1,4 +1,4 @@
-"""A person's arm, daylight, and things that lie about, for drawn scenes."""
+"""A person's arm, daylight, things that lie about, and wood, for drawn scenes."""
 
 import cv2
 import numpy as np
@@ -61,6 +61,7 @@ class Daylight:
         y, x = COARSE
         shadow = 1 / (1 + np.exp(-6 * (x + 0.4 * y - self._edge)))
         log = self._slope[0] * x + self._slope[1] * y - self._strength * shadow
+        log -= np.abs(self._slope).sum() / 2  # the brightest corner does not lose all colour
         light = cv2.resize(np.exp(log).astype(np.float32), image.shape[1::-1])
         return cv2.multiply(image, cv2.merge([light] * 3), dtype=cv2.CV_8U)
 
