@@ -17,8 +17,8 @@ LEAST_VARIATION = 1.0
 most, 0..255: a camera that sees less sees nothing happen."""
 LEAST_RETURN = 0.2
 """Least share of moments whose counterpart's counterpart is about where it began, in the median
-pair of videos. On the scenes TUNED_ON it is 0.9 or more, but 0.3 where squares are carried in
-any order; of independent random walks it is 0.13 or less."""
+pair of videos. On the scenes tabletop, hands and conveyor it is 0.9 or more, but 0.3 where squares
+are carried in any order; of independent random walks it is 0.13 or less."""
 
 
 def check_videos(cameras: dict[str, Sequence[Video]]) -> None:

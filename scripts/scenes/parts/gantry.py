@@ -1,5 +1,7 @@
 """A small MuJoCo table top with a gantry arm that is moved, not driven: no dynamics."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -41,10 +43,13 @@ WRIST = '<camera name="wrist" pos="0 -.11 .12" xyaxes="1 0 0 0 .75 .66" fovy="75
 class Gantry:
     """The table, the arm, and things that are bodies without joints (mocap)."""
 
+    frame = FRAME
+    """MJCF of the table and of the arm, with {things} and {wrist} to fill in."""
+
     def __init__(self, things: str, look: Look, rng: np.random.Generator, wrist: bool = False):
         """Build the model from the MJCF of the things."""
         choose_gl()
-        text = FRAME.format(things=things, wrist=WRIST if wrist else "")
+        text = self.frame.format(things=things, wrist=WRIST if wrist else "")
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
         self.cameras = ("front", "wrist") if wrist else ("front",)
@@ -54,9 +59,13 @@ class Gantry:
 
     def place(self, name: str, position: np.ndarray, angle: float = 0.0) -> None:
         """Put a thing somewhere, turned about the x axis by `angle` [rad]."""
+        self.pose(name, position, [np.cos(angle / 2), np.sin(angle / 2), 0, 0])
+
+    def pose(self, name: str, position: np.ndarray, turn: Sequence[float]) -> None:
+        """Put a thing somewhere, turned by a quaternion (w, x, y, z)."""
         body = self.model.body_mocapid[self.model.body(name).id]
         self.data.mocap_pos[body] = position
-        self.data.mocap_quat[body] = [np.cos(angle / 2), np.sin(angle / 2), 0, 0]
+        self.data.mocap_quat[body] = turn
 
     def where(self, name: str) -> np.ndarray:
         """Return where a thing is (3,) [m]."""
