@@ -4,9 +4,10 @@ import pytest
 from filtering.judging.moments import Timeline, judge_moments
 from filtering.moments.agreement import agree
 from filtering.moments.counterparts import choose_references, compare, find_counterparts
-from filtering.moments.decision import KINDS, exceedances, judge
+from filtering.moments.decision import KINDS, Observed, exceedances, judge
 from filtering.moments.effects import states_of, usual_change
-from filtering.moments.evidence import peak, worst
+from filtering.moments.evidence import moved, peak, worst
+from filtering.moments.replaced import Side, replaced
 from filtering.moments.score import score_moments
 from filtering.moments.vectors import Video, moment_vectors
 from filtering.moments.windows import PACES, window_distances
@@ -153,22 +154,27 @@ def test_large_pools_are_compared_with_central_videos_alone():
     assert len(compare(vectors, references).there[0]) == 40
 
 
+def observed(values, variety=0.0):
+    return Observed(dict.fromkeys(KINDS, np.asarray(values)), variety)
+
+
 def test_an_evidence_is_measured_against_its_pool():
     values = np.array([0.1, 0.2, 0.15, 0.12, 0.9])
     everybody = np.ones(5, dtype=bool)
     for kind in KINDS:
-        assert exceedances(kind, values, everybody).argmax() == 4
-    assert np.allclose(
-        exceedances("missing", values, everybody), exceedances("missing", values + 3, everybody)
-    )
+        found = exceedances(kind, observed(values), everybody)
+        assert found.argmax() == 4
+        assert np.allclose(found, exceedances(kind, observed(values + 3), everybody))
+        free = exceedances(kind, observed(values, variety=0.3), everybody)
+        assert 0 < free[4] < found[4]
 
 
 def test_an_evidence_is_measured_against_the_trusted_alone():
     values = np.array([0.1, 0.2, 0.15, 0.12, 0.9])
     trusted = np.array([True, True, True, True, False])
     far = np.where(trusted, values, 50.0)
-    expected = exceedances("missing", values, trusted)
-    assert np.array_equal(exceedances("missing", far, trusted)[:4], expected[:4])
+    expected = exceedances("missing", observed(values), trusted)
+    assert np.array_equal(exceedances("missing", observed(far), trusted)[:4], expected[:4])
 
 
 def test_who_is_flagged_is_trusted_no_longer():
@@ -179,7 +185,7 @@ def test_who_is_flagged_is_trusted_no_longer():
         values = np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.4, 2.0])
         # Without the worst one the last but one stands out, as of two that hide each other.
         values[5] += 2.0 * (not trusted[6])
-        return [dict.fromkeys(KINDS, values)]
+        return [observed(values)]
 
     trusted, _ = judge(evidence, 7)
     assert told[0] == [True] * 7
@@ -188,10 +194,34 @@ def test_who_is_flagged_is_trusted_no_longer():
 
 def test_half_of_a_pool_is_always_trusted():
     def evidence(trusted):
-        return [dict.fromkeys(KINDS, np.arange(6.0) * 10 * (trusted.sum() - 1))]
+        return [observed(np.arange(6.0) * 10 * (trusted.sum() - 1))]
 
     trusted, _ = judge(evidence, 6)
     assert trusted.sum() >= 3
+
+
+def test_a_moved_step_passes_what_lies_between():
+    sure = np.ones(30, dtype=bool)
+    usual, late = np.arange(30), np.r_[0:10, 20:30, 10:20]
+    at = np.argsort(late)  # moments 10-20 come after moments 20-30
+    assert not moved(usual, sure).any()
+    assert not moved(usual * 2, sure).any()  # another tempo
+    far = moved(at, sure)
+    assert not far[:10].any()
+    assert far[10:].min() > 0.15
+    assert not moved(at, ~sure).any()
+
+
+@pytest.mark.parametrize(
+    ("gap", "filled", "expected"), [(0, 0.0, 0.0), (20, 1.0, 1.0), (20, 0.0, 0)]
+)
+def test_a_stretch_is_replaced_where_its_time_is_filled(gap, filled, expected):
+    curve = np.zeros(60)
+    curve[20:40] = 1.0
+    at = np.r_[np.arange(20), np.full(20, 20), 20 + gap + np.arange(20)]
+    other = np.zeros(40 + gap)
+    other[20 : 20 + gap] = filled
+    assert replaced(Side(curve, at), other, 20, 40) == expected
 
 
 def test_the_worst_twelfth_counts():
@@ -204,7 +234,15 @@ def test_the_worst_twelfth_counts():
 
 
 def test_what_changes_nowhere_is_no_usual_change():
-    assert usual_change(0, np.zeros((5, 6, 8, 3))) is None
+    nothing = np.zeros((5, 6, 8, 3), dtype=np.float32)
+    change = nothing + 80
+    assert usual_change(0, nothing, nothing) is None
+    assert usual_change(0, change, change) is not None
+
+
+def test_what_changes_back_is_no_usual_change():
+    nothing = np.zeros((5, 6, 8, 3), dtype=np.float32)
+    assert usual_change(0, nothing + 80, nothing) is None
 
 
 def test_states_do_not_depend_on_the_light():
