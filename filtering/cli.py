@@ -171,6 +171,8 @@ def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
         if row.flagged:
             print(f"{names[row.demo_id]}  weight {row.weight:.2f}  {row.reason}")
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
+    for note in fitted.notes_:
+        print(note)
     for words in fitted.decision_.words if fitted.decision_ else ():
         print(f"{words}.")
     warning = caution(len(fitted.weights_))

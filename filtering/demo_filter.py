@@ -23,7 +23,7 @@ from filtering.judging.judgement import Judgement
 from filtering.judging.judges import judge_named
 from filtering.judging.thresholds import group_weights, probability_incorrect
 from filtering.segmentation.segmenter import segmenter_named
-from filtering.segmentation.segments import Segmentation
+from filtering.segmentation.segments import Segmentation, labels_at
 from filtering.vision.frame_features import FrameSource
 from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
@@ -40,6 +40,8 @@ FEWEST_DEMOS = 3
 """Least number of demonstrations; fewer have no majority."""
 FEW_DEMOS = 4
 """Number of demonstrations up to which `caution` warns of the limits of the result."""
+TOO_SHORT = "Some videos are too short for moments, so that only the found sub-tasks are judged."
+"""Note on a pool with videos of few moments."""
 ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features")
 """Settings that need pictures."""
 
@@ -99,6 +101,7 @@ from the whole video.
         cameras_: cameras used for segments and states; effects use all cameras of the pool unless
             some are named.
         looked_at_: cameras whose pictures were looked at.
+        notes_: sentences on what about this pool changed how it was judged.
         timings_: seconds per stage.
     """
 
@@ -118,6 +121,7 @@ from the whole video.
     chosen_: FilterConfig
     cameras_: tuple[str, ...]
     looked_at_: tuple[str, ...]
+    notes_: tuple[str, ...]
     timings_: dict[str, float]
 
     def __init__(self, config: FilterConfig | None = None) -> None:
@@ -136,7 +140,7 @@ from the whole video.
                 although a setting needs them.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
-        self.timings_ = {}
+        self.timings_, self.notes_ = {}, ()
         self._check(pool)
         require_sound(pool)
         self.chosen_ = self.config.for_source(pool)
@@ -192,12 +196,29 @@ from the whole video.
 
     def _by_both(self, pool: Source, workers: Workers) -> Judgement:
         """Judge by sub-tasks and by moments; the graver verdict counts."""
-        from filtering.judging.combined import combine
+        from filtering.judging.combined import combine, doubts
+        from filtering.moments.confirmed import confirmation
+        from filtering.moments.suitable import FEWEST_MOMENTS
 
-        by_moments, _ = self._moments(pool, workers)
         by_segments = self._by_segments(pool, workers)
-        joined = combine(by_segments, by_moments, pool.fps, self.config.groups)
-        return self._cut(joined)
+        if self._shortest(pool) < FEWEST_MOMENTS:
+            self.notes_ = (TOO_SHORT,)
+            return self._cut(by_segments)
+        by_moments, score = self._moments(pool, workers)
+        found = list(score.counterparts.values())
+        lengths = [episode.length for episode in pool.episodes]
+        labels = labels_at(self.segments_, lengths, found[0].lengths)
+        confirmed = max(confirmation(one, labels) for one in found)
+        self.notes_ = doubts(confirmed, score.one_order)
+        norm = None if self.notes_ else by_segments
+        return self._cut(combine(norm, by_moments, pool.fps, self.config.groups))
+
+    @staticmethod
+    def _shortest(pool: Source) -> int:
+        """Return the moments of the shortest video."""
+        from filtering.moments.score import RATE
+
+        return int(min(episode.length for episode in pool.episodes) / frame_rate(pool) * RATE)
 
     def _by_moments(self, pool: Source, workers: Workers) -> Judgement:
         """Judge by counterparts between the videos; segments only serve to show."""

@@ -1,31 +1,62 @@
 """The score `combined`: the graver of two verdicts, of the norm on sub-tasks and of moments.
 
 The norm judges whole steps, and is sure where the sub-tasks are found as they are; moments see what
-no sub-task stands for, and need none. Where sub-tasks are merged or split, the norm says little;
-what is done in another way or at another place says little to moments. Either may flag:
+no sub-task stands for, and need none. Either may flag:
 
     weight = min(w_norm, w_moments),    loss = -log weight.
+
+The norm is heard only where its sub-tasks are confirmed by counterparts, and where orders are not
+free: it would take rare orders for wrong ones.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
 from filtering.judging.explain import explain
 from filtering.judging.judgement import Judgement
-from filtering.judging.thresholds import Grouping, group_weights
+from filtering.judging.thresholds import Grouping, as_many_as_asked
 
 NATURES = ("kept", "out of order", "steps left out", "extra steps")
 """Groups of both, the best first."""
+CONFIRMED = 0.85
+"""Least agreement of sub-tasks with counterparts, see `confirmed.confirmation`. In pools of the
+scenes TUNED_ON and of tea-making it is 0.85 or more, but 0.5 to 0.65 where a scene's sub-tasks were
+mixed up and correct videos accused."""
+ONE_ORDER = 0.3
+"""Least share of the pairs of demonstrations that keep one order. With three camps of 6, 4 and 2 of
+12 it is 0.33; in the free-order pools of those scenes that the norm accuses it is 0.25 or less."""
 LEAST_WEIGHT = 1e-9
 """Keeps the logarithm of a weight finite."""
 
 
+def doubts(confirmed: float, one_order: float) -> tuple[str, ...]:
+    """Return why the norm is not heard, in sentences; empty if it is.
+
+    Args:
+        confirmed: agreement of the sub-tasks with counterparts.
+        one_order: share of the pairs of demonstrations that keep one order.
+    """
+    found = []
+    if one_order < ONE_ORDER:
+        found.append(
+            f"There are several ways of doing it: {one_order:.0%} of the pairs of demonstrations "
+            "keep one order, so that another order is no evidence."
+        )
+    if confirmed < CONFIRMED:
+        found.append(
+            "The found sub-tasks are not the same in all videos, so that only moments are judged."
+        )
+    return tuple(found)
+
+
 def combine(
-    norm: Judgement, moments: Judgement, fps: float | None, groups: str = "auto"
+    norm: Judgement | None, moments: Judgement, fps: float | None, groups: str = "auto"
 ) -> Judgement:
     """Put two judgements of the same D demonstrations together.
 
     Args:
-        norm: by sub-tasks, with named groups.
+        norm: by sub-tasks, with named groups; None if it is not heard.
         moments: by moments, with named groups and a reason for each demonstration.
         fps: frames per second, None where it is not known.
         groups: how many groups there are, or auto: by the nature of the mistake.
@@ -33,17 +64,18 @@ def combine(
     Raises:
         ConfigError: there are fewer demonstrations than groups.
     """
+    if norm is None:
+        grouping = as_many_as_asked(moments.grouping, moments.weights, groups)
+        return replace(moments, grouping=grouping)
     late = moments.weights < norm.weights
     weights = np.maximum(np.where(late, moments.weights, norm.weights), LEAST_WEIGHT)
     reasons = moments.reasons or ("",) * len(weights)
     pairs = list(zip(late, norm.findings, moments.findings, reasons, strict=True))
-    grouping = _by_nature(norm.grouping, moments.grouping, late)
-    if groups != "auto" and int(groups) != grouping.count:
-        grouping = group_weights(weights, groups)
+    natures = _by_nature(norm.grouping, moments.grouping, late)
     return Judgement(
         losses=-np.log(weights),
         weights=weights,
-        grouping=grouping,
+        grouping=as_many_as_asked(natures, weights, groups),
         trust=norm.trust,
         findings=tuple(
             theirs + ours if second else ours + theirs for second, ours, theirs, _ in pairs

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from filtering.judging.explain import Clock, Finding
 from filtering.judging.judgement import Judgement
-from filtering.judging.thresholds import Grouping, group_weights
+from filtering.judging.thresholds import Grouping, as_many_as_asked
 from filtering.moments.evidence import Stretch
 from filtering.moments.score import MomentFinding, MomentScore, score_moments
 from filtering.moments.vectors import Video
@@ -67,9 +67,7 @@ def judge_moments(
     """
     score = score_moments(cameras)
     weights = 1 - score.probabilities
-    grouping = _by_nature(score)
-    if groups != "auto" and int(groups) != grouping.count:
-        grouping = group_weights(weights, groups)
+    grouping = as_many_as_asked(_by_nature(score), weights, groups)
     counts = {camera: [len(video) for video in videos] for camera, videos in cameras.items()}
     findings = tuple(
         tuple(_finding(one, counts[one.camera], timeline) for one in found)

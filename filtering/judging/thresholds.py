@@ -88,6 +88,17 @@ def group_weights(
     return grouper(weights, min(int(groups), len(np.unique(weights))))
 
 
+def as_many_as_asked(grouping: Grouping, weights: NDArray[np.float64], groups: str) -> Grouping:
+    """Return a grouping by nature, or one of weights (D,) if another number of groups is asked for.
+
+    Raises:
+        ConfigError: there are fewer demonstrations than groups.
+    """
+    if groups in ("auto", str(grouping.count)):
+        return grouping
+    return group_weights(weights, groups)
+
+
 Grouper = Callable[[NDArray[np.float64], int], Grouping]
 """Splits weights (D,) into a number of groups, fewer where a group would be empty."""
 

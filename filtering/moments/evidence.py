@@ -39,6 +39,8 @@ SHARED = 0.2
 MOST_PAIRS = 0.6
 """Share of the pairs of demonstrations by which it is told how free orders are: in a pool of ten
 demonstrations of one order and four of another, 0.56 of the pairs agree."""
+SMALL_MOVE = 0.02
+"""Least move of a step that changes the order [length of a video]."""
 WORST = 12
 """The worst 1 / WORST of a video counts."""
 TINY = 1e-6
@@ -89,13 +91,26 @@ def missing_order_extra(
     )
 
 
-def variety_of(found: Counterparts, trusted: Trusted) -> float:
-    """Return how far steps move from one trusted demonstration to another [length of a video].
+def moves_between(found: Counterparts, trusted: Trusted) -> Array:
+    """Return (P,): per pair of trusted demonstrations how far steps move [length of a video]."""
+    references = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
+    return np.array([far for reference in references for far in reference.moves()])
+
+
+def variety_of(moves: Array) -> float:
+    """Return how far steps move from one demonstration to another [length of a video].
 
     It is 0 while most pairs of demonstrations keep one order.
+
+    Args:
+        moves: (P,) see `moves_between`.
     """
-    references = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
-    return float(np.quantile([far for r in references for far in r.moves()], MOST_PAIRS))
+    return float(np.quantile(moves, MOST_PAIRS))
+
+
+def share_of_one_order(moves: Array) -> float:
+    """Return the share of the pairs of demonstrations that keep one order; see `variety_of`."""
+    return float((moves < SMALL_MOVE).mean())
 
 
 def rows_of(found: Counterparts, trusted: Trusted) -> list[int]:

@@ -20,7 +20,15 @@ from filtering.moments.decision import (
     telling,
 )
 from filtering.moments.effects import View, ineffective, observe
-from filtering.moments.evidence import Evidence, Stretch, Trusted, missing_order_extra, variety_of
+from filtering.moments.evidence import (
+    Evidence,
+    Stretch,
+    Trusted,
+    missing_order_extra,
+    moves_between,
+    share_of_one_order,
+    variety_of,
+)
 from filtering.moments.suitable import (
     LEAST_RETURN,
     check_videos,
@@ -78,6 +86,8 @@ class MomentScore:
     """Per camera that was of use."""
     structure: Mapping[str, float]
     """Per camera how much the videos have in common, see `suitable.shared_structure`."""
+    one_order: float
+    """Share of the pairs of demonstrations that keep one order, as most cameras see it."""
 
     @property
     def probabilities(self) -> Array:
@@ -163,12 +173,16 @@ def _judged(
         evidence.update({c: gather(found[c], views[c], trusted) for c in cameras})
         return [
             Observed(
-                {kind: evidence[c][kind].values for kind in KINDS}, variety_of(found[c], trusted)
+                {kind: evidence[c][kind].values for kind in KINDS},
+                variety_of(moves_between(found[c], trusted)),
             )
             for c in cameras
         ]
 
-    _, each = judge(values, len(next(iter(found.values())).lengths))
+    count = len(next(iter(found.values())).lengths)
+    _, each = judge(values, count)
+    everybody = np.ones(count, dtype=np.bool_)
+    one_order = [share_of_one_order(moves_between(found[c], everybody)) for c in cameras]
     exceeded = most_telling(each)
     chosen = {kind: telling([one[kind] for one in each]) for kind in KINDS}
     findings = []
@@ -179,7 +193,14 @@ def _judged(
             one = evidence[camera][kind]
             said.append(MomentFinding(kind, camera, one.own[d], one.other[d], z))
         findings.append(_in_order(said))
-    return MomentScore(strengths_of(exceeded), exceeded, tuple(findings), found, structure)
+    return MomentScore(
+        strengths_of(exceeded),
+        exceeded,
+        tuple(findings),
+        found,
+        structure,
+        one_order=float(np.median(one_order)),
+    )
 
 
 def _in_order(said: Sequence[MomentFinding]) -> tuple[MomentFinding, ...]:

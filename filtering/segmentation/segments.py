@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from filtering.vision.frame_features import sampled_frames
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
 from teasim.pool.source import Source
@@ -64,6 +65,27 @@ class Segmentation:
             )
             for video, *demo in zip(self.posteriors, self.spans, self.labels(), strict=True)
         ]
+
+
+def labels_at(
+    found: Segmentation, lengths: Sequence[int], moments: Sequence[int]
+) -> list[NDArray[np.int64]]:
+    """Return per demonstration (n,): label of its moments, -1 where there is none.
+
+    Args:
+        found: the segments.
+        lengths: frames of each demonstration.
+        moments: n, moments that each was looked at in.
+    """
+    result = []
+    for spans, labels, length, count in zip(
+        found.spans, found.labels(), lengths, moments, strict=True
+    ):
+        frames = np.full(length, -1, dtype=np.int64)
+        for span, label in zip(spans, labels, strict=True):
+            frames[span.start : span.stop] = label
+        result.append(frames[sampled_frames(length, count)])
+    return result
 
 
 def label_numbers(spans: Sequence[tuple[Span, ...]], subtasks: tuple[str, ...]) -> list[list[int]]:
