@@ -1,4 +1,4 @@
-"""Judge pools drawn from the scenes by moments of their videos alone, and count what is right.
+"""Judge pools drawn from the scenes by the default filter, and count what is right.
 
 The truth is read for counting only. Scenes that are kept back are judged with --held-back alone,
 when everything has been chosen. A folder that make_scenes.py did not write is made first. Pools of
@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scenes.parts.part import Part
 from scenes.parts.writing import make_bank
 from scenes.registry import HELD_BACK, SCENES, TUNED_ON
 from scenes.scene import MISTAKES
 
-from filtering.moments.score import MomentScore, look, score_moments
-from filtering.moments.vectors import Video
-from filtering.vision.frame_features import sampled_frames
+from filtering import DemoFilter, FilterConfig
 from teasim.common.statistics import auroc
 from teasim.common.workers import Workers
 from teasim.pool import Pool
@@ -44,8 +43,8 @@ class Bank:
     """The pool they are from."""
     episodes: list[Episode]
     """The videos."""
-    seen: dict[str, list[Video]]
-    """What each camera saw."""
+    cameras: tuple[str, ...]
+    """The cameras that are used."""
     kinds: np.ndarray
     """(n,) the kind of each."""
 
@@ -77,6 +76,7 @@ def main() -> int:
     parser.add_argument("--pools", type=int, default=4, help="pools per scene and kind")
     parser.add_argument("--bad", type=int, nargs="+", default=[3], help="incorrect ones per pool")
     parser.add_argument("--share", type=float, default=1.0, help="share of the videos drawn from")
+    parser.add_argument("--score", default="auto", help="score of the filter")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1, help="processes that look at videos")
     arguments = parser.parse_args()
@@ -94,7 +94,7 @@ def main() -> int:
 
 
 def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.Namespace) -> Bank:
-    """Look at the first videos of each kind of a pool."""
+    """Take the first videos of each kind of a pool."""
     kinds = np.array([kind_of(episode.record) for episode in pool.episodes])
     chosen = np.sort(
         np.concatenate(
@@ -105,8 +105,7 @@ def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.N
         )
     )
     episodes = [pool.episodes[number] for number in chosen]
-    seen = look(pool, episodes, cameras, workers=Workers(arguments.jobs))
-    return Bank(name, pool, episodes, seen, kinds[chosen])
+    return Bank(name, pool, episodes, tuple(cameras), kinds[chosen])
 
 
 def kind_of(record) -> str:
@@ -119,8 +118,10 @@ def judge(bank: Bank, arguments: argparse.Namespace) -> None:
     """Print one line per kind of pool."""
     rows: dict[str, list[dict[str, float]]] = {}
     for drawn in draw(bank.kinds, arguments):
-        part = {c: [seen[v] for v in drawn.videos] for c, seen in bank.seen.items()}
-        rows.setdefault(drawn.label, []).append(count(bank, drawn, score_moments(part)))
+        part = Part(bank.pool, [bank.episodes[v] for v in drawn.videos])
+        config = FilterConfig(score=arguments.score, cameras=bank.cameras)
+        fitted = DemoFilter(config).fit(part, workers=Workers(arguments.jobs))
+        rows.setdefault(drawn.label, []).append(count(bank, drawn, fitted))
     for kind, counted in rows.items():
         mean = {key: _mean([row[key] for row in counted]) for key in counted[0]}
         if kind in ("usual", "free"):
@@ -150,16 +151,16 @@ def draw(kinds: np.ndarray, arguments: argparse.Namespace) -> Iterator[Drawn]:
             yield Drawn(kind, videos, np.zeros(len(videos), dtype=bool))
 
 
-def count(bank: Bank, drawn: Drawn, score: MomentScore) -> dict[str, float]:
+def count(bank: Bank, drawn: Drawn, fitted: DemoFilter) -> dict[str, float]:
     """Return what is right about the judgement of one pool."""
-    bad, flagged = drawn.bad, score.flagged
+    bad, flagged = drawn.bad, fitted.flagged_
     right = [
-        _place_is_right(bank, drawn, score, d)
+        _place_is_right(bank, drawn, fitted, d)
         for d in np.flatnonzero(bad & flagged)
         if bank.episodes[drawn.videos[d]].record.mistakes
     ]
     return {
-        "auroc": auroc(score.losses, bad) if bad.any() else np.nan,
+        "auroc": auroc(fitted.losses_, bad) if bad.any() else np.nan,
         "found": flagged[bad].mean() if bad.any() else np.nan,
         "accused": float(flagged[~bad].sum()),
         "silent": float(not flagged[~bad].any()),
@@ -173,15 +174,15 @@ def _mean(values: Sequence[float]) -> float:
     return float(np.mean(known)) if known else np.nan
 
 
-def _place_is_right(bank: Bank, drawn: Drawn, score: MomentScore, d: int) -> bool:
+def _place_is_right(bank: Bank, drawn: Drawn, fitted: DemoFilter, d: int) -> bool:
     """Tell whether the first finding of a demonstration lies at one of its mistakes."""
-    episode, first = bank.episodes[drawn.videos[d]], score.findings[d][0]
-    frames = sampled_frames(episode.length, len(bank.seen[first.camera][drawn.videos[d]]))
-    start, stop = frames[first.own.start], frames[first.own.stop - 1]
+    first = fitted.findings_[d][0]
+    shown = first.came or first.ineffective
+    start, stop = (shown.start, shown.stop) if shown else (first.frame, first.frame)
     slack = NEAR * bank.pool.fps
     return any(
         start <= mistake.stop + slack and stop >= mistake.start - slack
-        for mistake in episode.record.mistakes
+        for mistake in bank.episodes[drawn.videos[d]].record.mistakes
     )
 
 
