@@ -263,8 +263,9 @@ from the whole video.
             evidence = self._evidence(pool, workers)
         # The matrices are small: several BLAS threads would only wait for each other.
         with self._timed("weights"), threadpool_limits(limits=1, user_api="blas"):
-            plain = replace(self.chosen_, score="norm", groups="auto", threshold="auto")
-            settings = plain if self.chosen_.score == COMBINED else self.chosen_
+            settings = self.chosen_
+            if settings.score == COMBINED:
+                settings = replace(settings, score="norm", groups="auto", threshold="auto")
             return judge_named(settings.score)(evidence, settings)
 
     def _segments(self, pool: Source, workers: Workers) -> Segmentation:

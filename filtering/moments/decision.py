@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 KINDS = ("missing", "order", "extra", "ineffective")
 """Kinds of evidence."""
 SCALE: Mapping[str, float] = MappingProxyType(
-    {"missing": 0.3, "order": 0.15, "extra": 0.4, "ineffective": 0.8}
+    {"missing": 0.3, "order": 0.15, "extra": 0.36, "ineffective": 0.8}
 )
 """Evidence of each kind above which a video is flagged in a pool without scatter and variety.
 Chosen with FREE and SCATTER on two pools of every kind of each scene TUNED_ON and on twenty of
