@@ -122,7 +122,7 @@ def segment(argv: Sequence[str] | None = None) -> int:
 
 
 def _filter(command: FilterCommand) -> int:
-    from filtering.demo_filter import DemoFilter
+    from filtering.by_task import fit_by_task
     from filtering.output import check_output, write_filter_output
     from teasim.pool.readers.registry import open_source
     from teasim.pool.soundness import print_notes
@@ -130,7 +130,7 @@ def _filter(command: FilterCommand) -> int:
     pool = open_source(command.source, command.options)
     print_notes(pool)
     check_output(command.out, pool.root, overwrite=command.overwrite)
-    fitted = DemoFilter(command.config).fit(pool, workers=command.workers)
+    fitted = fit_by_task(command.config, pool, workers=command.workers)
     write_filter_output(
         command.out, pool, fitted, overwrite=command.overwrite, workers=command.workers
     )

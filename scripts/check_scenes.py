@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scenes.parts.part import Part
 from scenes.parts.writing import make_bank
 from scenes.registry import HELD_BACK, SCENES, TUNED_ON
 from scenes.scene import MISTAKES
@@ -24,6 +23,7 @@ from teasim.common.statistics import auroc
 from teasim.common.workers import Workers
 from teasim.pool import Pool
 from teasim.pool.lerobot import Episode
+from teasim.pool.part import Part
 
 GOOD, CLEAN = 10, 12
 """Usual videos of a pool with mistakes, and videos of a pool without."""
