@@ -324,12 +324,11 @@ from the whole video.
         self.weights_ = judgement.weights
         self.losses_ = judgement.losses
         self.decision_ = judgement.decision
-        if judgement.probabilities is not None:
-            self.probabilities_ = judgement.probabilities
-        elif judgement.decision is not None:
-            self.probabilities_ = judgement.decision.probabilities
-        else:
-            self.probabilities_ = probability_incorrect(judgement.losses)
+        self.probabilities_ = (
+            probability_incorrect(judgement.losses)
+            if judgement.probabilities is None
+            else judgement.probabilities
+        )
         self.trust_ = judgement.trust
         self.objective_ = judgement.objective
         self.groups_ = judgement.grouping.groups

@@ -56,6 +56,8 @@ class Finding:
     """Segment in which the expected sub-task came later; None where it did not."""
     ineffective: Span | None = None
     """Segment of the expected sub-task when it was carried out without effect; else None."""
+    rule: str = ""
+    """Rule of the user that is broken here, in words; empty where the pool alone accuses."""
 
 
 def explain(findings: Sequence[Finding], fps: float | None) -> str:
@@ -75,9 +77,11 @@ def explain(findings: Sequence[Finding], fps: float | None) -> str:
     if named.ineffective is not None:
         when = clock.during(named.ineffective)
         sentence = f"'{named.expected}' was carried out ({when}), but it had no visible effect"
+    elif named.rule:
+        sentence = _breach(named, clock)
     else:
         sentence = f"{_place(named, clock)} {_expectation(named)}, {_sight(named, clock)}"
-    if named.missing:
+    if named.missing and not named.rule:
         sentence += f"; '{named.expected}' is missing from the whole video"
     elif named.came is not None:
         sentence += f"; '{named.expected}' came later ({clock.during(named.came)})"
@@ -95,6 +99,15 @@ def gravest(findings: Sequence[Finding]) -> list[Finding]:
     """Return the findings at least GRAVE times as surprising as the worst one."""
     worst = max(item.surprise for item in findings)
     return [item for item in findings if item.surprise >= GRAVE * worst]
+
+
+def _breach(finding: Finding, clock: Clock) -> str:
+    """Return how a rule of the user is broken; where nobody does a step, it has no usual place."""
+    if not finding.missing:
+        return f"This demonstration breaks the rule: {finding.rule}; {_sight(finding, clock)}"
+    nowhere = finding.after is None and finding.seen is None
+    where = "" if nowhere else f" (expected at {clock.at(finding.frame)})"
+    return f"{finding.rule}, and it is missing from the whole video{where}"
 
 
 def _place(finding: Finding, clock: Clock) -> str:

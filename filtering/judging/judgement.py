@@ -30,7 +30,8 @@ class Judgement:
     reasons: tuple[str, ...] | None = None
     """Per demonstration a sentence on the most important finding; None where the findings name
     sub-tasks and `explain` writes it."""
-    probabilities: Array | None = None
-    """(D,) probability of being incorrect; None where the losses alone tell it."""
     decision: "PoolDecision | None" = None
     """The learned decision; None where clusters decided."""
+    probabilities: Array | None = None
+    """(D,) probability that each demonstration is incorrect, with the rules of the user; None
+    where it follows from the losses by `probability_incorrect`."""

@@ -22,7 +22,9 @@ from filtering.judging.judgement import Judgement
 from filtering.judging.norm.cut import by_nature, decide
 from filtering.judging.norm.departures import find_departures
 from filtering.judging.norm.norm_score import NormScore, score_steps
-from filtering.judging.norm.precedence import precedence_graph
+from filtering.judging.rules.legal import legal_evidence
+from filtering.judging.rules.rules import charges_of, rules_of
+from filtering.judging.rules.verdict import ruled
 from filtering.judging.thresholds import Grouping, group_weights
 from teasim.common.arrays import Array
 from teasim.common.registry import named
@@ -43,14 +45,18 @@ def by_norm(evidence: Evidence, config: JudgingConfig) -> Judgement:
     """Judge by what most of the pool does (the default score).
 
     Raises:
-        ConfigError: the precedence does not fit the pool, or there are fewer demonstrations than
-            groups.
+        ConfigError: the rules of the user do not fit the pool, or there are fewer demonstrations
+            than groups.
     """
-    counts = evidence.counts
-    if config.precedence:
-        counts = counts.restricted(precedence_graph(config.precedence, evidence.subtasks))
+    rules = rules_of(config, evidence.subtasks)
+    charges = charges_of(rules, evidence.labels, evidence.places)
+    return ruled(_by_usual(legal_evidence(evidence, rules), config), charges)
+
+
+def _by_usual(evidence: Evidence, config: JudgingConfig) -> Judgement:
+    """Judge without rules of the user."""
     n_groups = 3 if config.groups == "3" else 2
-    found = score_steps(counts, tolerance=config.tolerance, n_groups=n_groups)
+    found = score_steps(evidence.counts, tolerance=config.tolerance, n_groups=n_groups)
     ineffective = ineffective_losses(found, evidence)
     worst = np.array([nats.max(initial=0.0) for nats in ineffective])
     losses = found.losses + worst
@@ -66,7 +72,10 @@ def by_norm(evidence: Evidence, config: JudgingConfig) -> Judgement:
         if config.threshold != "auto":
             grouping = group_weights(weights, config.groups, config.threshold)
     findings = find_departures(found, evidence.labels, evidence.places, ineffective)
-    return Judgement(losses, weights, grouping, found.trust, findings, decision=decision)
+    p = None if decision is None else decision.probabilities
+    return Judgement(
+        losses, weights, grouping, found.trust, findings, decision=decision, probabilities=p
+    )
 
 
 def _learned(evidence: Evidence, cost: float) -> "PoolDecision":
