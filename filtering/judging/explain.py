@@ -1,10 +1,13 @@
-"""One sentence about a flagged demonstration: which step is unusual, where, and why."""
+"""One sentence about a demonstration: which step is unusual, where, and why."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from teasim.pool import Span
 
+ODD = 0.8
+"""Weight below which it is also said of a kept demonstration what was odd. A round number: a
+learner would feel the missing fifth."""
 GRAVE = 0.5
 """Share of the largest surprise from which a finding may be named first."""
 
@@ -56,6 +59,8 @@ class Finding:
     """Segment in which the expected sub-task came later; None where it did not."""
     ineffective: Span | None = None
     """Segment of the expected sub-task when it was carried out without effect; else None."""
+    extra: Span | None = None
+    """Segment of a step that few others carry out, or that often; else None."""
     rule: str = ""
     """Rule of the user that is broken here, in words; empty where the pool alone accuses."""
 
@@ -68,15 +73,15 @@ def explain(findings: Sequence[Finding], fps: float | None) -> str:
         fps: frames per second; None where it is not known.
     """
     if not findings:
-        return (
-            "No single step stands out, but all steps together are less usual than those of the "
-            "kept demonstrations."
-        )
+        return "No single step stands out, but all steps together are less usual than most."
     clock = Clock(fps)
     named = findings[0]
     if named.ineffective is not None:
         when = clock.during(named.ineffective)
         sentence = f"'{named.expected}' was carried out ({when}), but it had no visible effect"
+    elif named.extra is not None:
+        when = clock.during(named.extra)
+        sentence = f"'{named.seen}' was carried out ({when}), which few others do so often"
     elif named.rule:
         sentence = _breach(named, clock)
     else:
@@ -93,6 +98,11 @@ def explain(findings: Sequence[Finding], fps: float | None) -> str:
         )
         sentence += f"; {'also missing' if named.missing else 'missing'}: {where}"
     return sentence + "."
+
+
+def kept_though(sentence: str) -> str:
+    """Return what was odd about a demonstration that is kept, given the sentence about it."""
+    return f"Kept, though odd: {sentence}"
 
 
 def gravest(findings: Sequence[Finding]) -> list[Finding]:

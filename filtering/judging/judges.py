@@ -5,7 +5,7 @@
 * `equation3`: the conditional next-step model of the paper, trimmed, with k-means on its weights.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -18,9 +18,11 @@ from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.solvers import solver_named
 from filtering.judging.equation3.surprises import find_surprises
 from filtering.judging.evidence import Evidence
+from filtering.judging.explain import Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.norm.cut import by_nature, decide
 from filtering.judging.norm.departures import find_departures
+from filtering.judging.norm.extras import find_extras
 from filtering.judging.norm.norm_score import NormScore, score_steps
 from filtering.judging.rules.legal import legal_evidence
 from filtering.judging.rules.rules import charges_of, rules_of
@@ -61,20 +63,32 @@ def _by_usual(evidence: Evidence, config: JudgingConfig) -> Judgement:
     worst = np.array([nats.max(initial=0.0) for nats in ineffective])
     losses = found.losses + worst
     left_out = found.left_out + worst > found.out_of_order
-    decision = None
-    if config.learns:
-        decision = _learned(evidence, config.cost)
-        weights = 1 - decision.probabilities
-        numbers, names = by_nature(decision.flagged, left_out)
-        grouping = Grouping(numbers, (1 - decision.cut) * (numbers.max() > 0), names)
-    else:
-        weights, grouping = decide(losses, left_out, config.groups)
-        if config.threshold != "auto":
-            grouping = group_weights(weights, config.groups, config.threshold)
     findings = find_departures(found, evidence.labels, evidence.places, ineffective)
-    p = None if decision is None else decision.probabilities
-    return Judgement(
-        losses, weights, grouping, found.trust, findings, decision=decision, probabilities=p
+    if config.learns:
+        findings = _with_extras(
+            findings, find_extras(evidence.labels, found.trust, evidence.places)
+        )
+        extra = np.array([bool(own) and own[0].extra is not None for own in findings])
+        decision = _learned(evidence, config.cost)
+        numbers, names = by_nature(decision.flagged, left_out, extra)
+        grouping = Grouping(numbers, (1 - decision.cut) * (numbers.max() > 0), names)
+        p = decision.probabilities
+        return Judgement(
+            losses, 1 - p, grouping, found.trust, findings, decision=decision, probabilities=p
+        )
+    weights, grouping = decide(losses, left_out, config.groups)
+    if config.threshold != "auto":
+        grouping = group_weights(weights, config.groups, config.threshold)
+    return Judgement(losses, weights, grouping, found.trust, findings)
+
+
+def _with_extras(
+    findings: Sequence[tuple[Finding, ...]], extras: Sequence[tuple[Finding, ...]]
+) -> tuple[tuple[Finding, ...], ...]:
+    """Add extra steps, which only the learned decision judges, by falling surprise."""
+    return tuple(
+        tuple(sorted((*own, *extra), key=lambda item: -round(item.surprise, 6)))
+        for own, extra in zip(findings, extras, strict=True)
     )
 
 

@@ -76,6 +76,20 @@ class Places:
             came=next((s for s in later if s.subtask == expected), None),
         )
 
+    def extra(self, demo: int, label: int, surprise: float) -> Finding:
+        """Return the finding that `label` was carried out once more than usual."""
+        spans = self.segments[demo]
+        last = max(row for row, span in enumerate(spans) if span.subtask == self.subtasks[label])
+        return Finding(
+            expected=None,
+            seen=spans[last].subtask,
+            after=spans[last - 1] if last else None,
+            frame=spans[last].start,
+            missing=False,
+            surprise=surprise,
+            extra=spans[last],
+        )
+
     def ineffective(self, demo: int, losses: Array) -> list[Finding]:
         """Return the findings of ineffective steps, for what each segment adds (q,) [nats]."""
         spans = self.segments[demo]
