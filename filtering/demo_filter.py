@@ -343,7 +343,9 @@ from the whole video.
         self.flagged_ = judgement.grouping.flagged
         self.threshold_ = judgement.grouping.threshold
         self.findings_ = judgement.findings
-        sentences = judgement.reasons or [explain(found, fps) for found in judgement.findings]
+        sentences = judgement.reasons or [
+            explain(found, fps, judgement.otherwise) for found in judgement.findings
+        ]
         self.reasons_ = tuple(
             sentence if flagged else kept_though(sentence) if weight < ODD else ""
             for sentence, flagged, weight in zip(

@@ -23,6 +23,8 @@ SubtaskNames = Annotated[tuple[str, ...], tyro.conf.arg(metavar="SUBTASK")]
 
 FOR_NORM = ("precedence", "keep", "optional", "critical", "tolerance")
 """Settings that only the score norm takes."""
+JUDGED_BY = ("auto", "w", "leave-one-out")
+"""What can be made of equation 3."""
 DECISIONS = ("learned", "clusters")
 """Ways to decide who is flagged."""
 
@@ -65,6 +67,10 @@ class JudgingConfig:
     solver: str = "annealed"
     """Solver of equation 3: annealed, alternating, exact (at most 24 different demonstrations) or
     published (SLSQP of SciPy, without a ridge)."""
+    judged_by: str = "auto"
+    """What equation 3 says of a demonstration: w (the weight that the solver gives it, as
+    published), or leave-one-out (how surprising it is to models of the others). auto: w for the
+    solver published, leave-one-out for the others."""
     trusted_share: float = 0.5
     """M / D, share of the demonstrations that equation 3 trusts, between 0 and 1."""
     ridge: float = 0.01
@@ -82,6 +88,8 @@ class JudgingConfig:
             raise ConfigError(
                 f"Unknown decision '{self.decision}'; choose {' or '.join(DECISIONS)}."
             )
+        if self.judged_by not in JUDGED_BY:
+            raise ConfigError(f"judged_by is '{self.judged_by}'; choose {', '.join(JUDGED_BY)}.")
         if not 0.0 < self.cost < math.inf:
             raise ConfigError(f"cost is {self.cost}; choose a number above 0.")
         if not 0.0 < self.trusted_share < 1.0:
@@ -100,6 +108,11 @@ class JudgingConfig:
         plain = self.groups == "auto" and self.threshold == "auto"
         named = self.score in ("auto", "norm")
         return self.decision == "learned" and named and plain and not self.tolerance
+
+    @property
+    def by_w(self) -> bool:
+        """Whether the weights of equation 3 themselves judge, as published."""
+        return self.judged_by == "w" or (self.judged_by == "auto" and self.solver == "published")
 
     def _check_rules(self) -> None:
         for name in ("precedence", "keep"):

@@ -65,15 +65,20 @@ class Finding:
     """Rule of the user that is broken here, in words; empty where the pool alone accuses."""
 
 
-def explain(findings: Sequence[Finding], fps: float | None) -> str:
+NO_STEP = "No single step stands out, but all steps together are less usual than most."
+"""What is said where there is no finding."""
+
+
+def explain(findings: Sequence[Finding], fps: float | None, otherwise: str = NO_STEP) -> str:
     """Return one sentence about the first finding and all other missing sub-tasks.
 
     Args:
         findings: of one demonstration, the most important one first.
         fps: frames per second; None where it is not known.
+        otherwise: what to say where there is no finding.
     """
     if not findings:
-        return "No single step stands out, but all steps together are less usual than most."
+        return otherwise
     clock = Clock(fps)
     named = findings[0]
     if named.ineffective is not None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from filtering.judging.explain import Finding
+from filtering.judging.explain import NO_STEP, Finding
 from filtering.judging.thresholds import Grouping
 from teasim.common.arrays import Array
 
@@ -35,3 +35,5 @@ class Judgement:
     probabilities: Array | None = None
     """(D,) probability that each demonstration is incorrect, with the rules of the user; None
     where it follows from the losses by `probability_incorrect`."""
+    otherwise: str = NO_STEP
+    """Sentence about a demonstration without findings."""

@@ -2,7 +2,8 @@
 
 * `norm`, the default: the losses of `norm_score` plus those of ineffective steps, cut and grouped
   by `norm.cut`.
-* `equation3`: the conditional next-step model of the paper, trimmed, with k-means on its weights.
+* `equation3`: the conditional next-step model of the paper, trimmed. Either its weights w
+  themselves are clustered, as published, or each demonstration is scored by models of the others.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +19,7 @@ from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.solvers import solver_named
 from filtering.judging.equation3.surprises import find_surprises
 from filtering.judging.evidence import Evidence
-from filtering.judging.explain import Finding
+from filtering.judging.explain import NO_STEP, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.norm.cut import by_nature, decide
 from filtering.judging.norm.departures import find_departures
@@ -38,6 +39,11 @@ INEFFECTIVE_PRIOR = 1.0
 """Log-odds against an ineffective step before the video is examined [nats]. A round number, odds of
 e to 1; detection with it is reported for rendered tea pools in docs/results.md."""
 
+NO_STEP_OF_W = (
+    "No single step stands out; the weights w of equation 3 always add up to M, so that one below "
+    "1 need not mean that anything is odd."
+)
+"""What is said of a demonstration without findings that w judges."""
 
 Judge = Callable[[Evidence, JudgingConfig], Judgement]
 """A score with its rule for weights and groups."""
@@ -117,7 +123,11 @@ def ineffective_losses(found: NormScore, evidence: Evidence) -> list[Array]:
 
 
 def by_equation_3(evidence: Evidence, config: JudgingConfig) -> Judgement:
-    """Judge by the surprises of equation 3.
+    """Judge by the surprises of equation 3, or as published by its weights w.
+
+    The paper clusters w into a number of groups that it is told (section 3.3): the solver
+    `published` with `groups` 2 or 3 and a `threshold` of kmeans, gmm or minibatch. Reasons come
+    from the surprises in either case.
 
     Raises:
         ConfigError: there are too many different demonstrations for the solver, or fewer
@@ -127,14 +137,16 @@ def by_equation_3(evidence: Evidence, config: JudgingConfig) -> Judgement:
     problem = Problem(rows, config.ridge)
     solved = solver_named(config.solver).fit(problem, config.trusted_share * rows.n_demos)
     found = score(problem, solved)
+    weights = solved.weights_ if config.by_w else found.weights
     threshold = "kmeans" if config.threshold == "auto" else config.threshold
     return Judgement(
-        losses=found.losses,
-        weights=found.weights,
-        grouping=group_weights(found.weights, config.groups, threshold),
+        losses=solved.losses_ if config.by_w else found.losses,
+        weights=weights,
+        grouping=group_weights(weights, config.groups, threshold),
         trust=solved.weights_,
         findings=find_surprises(rows, found, evidence.labels, evidence.places),
         objective=solved.objective_,
+        otherwise=NO_STEP_OF_W if config.by_w else NO_STEP,
     )
 
 
