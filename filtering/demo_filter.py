@@ -43,7 +43,7 @@ FEW_DEMOS = 4
 """Number of demonstrations up to which `caution` warns of the limits of the result."""
 TOO_SHORT = "Some videos are too short for moments, so that only the found sub-tasks are judged."
 """Note on a pool with videos of few moments."""
-ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features")
+ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features", "backbone")
 """Settings that need pictures."""
 
 
@@ -324,6 +324,7 @@ from the whole video.
             frames_per_segment=self.config.frames_per_segment,
             background=self.config.background,
             workers=workers,
+            backbone=self.config.network,
         )
         return reduce_features(features)
 
