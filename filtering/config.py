@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from filtering.features.config import POOLED
-from filtering.judging.config import JudgingConfig
+from filtering.judging.config import FOR_NORM, JudgingConfig
 from filtering.vision.pretrained import LITE, Backbone
 from teasim.common.errors import ConfigError
 from teasim.pool.source import Source
@@ -110,7 +110,8 @@ class FilterConfig(JudgingConfig):
     @property
     def _is_plain(self) -> bool:
         """Whether no setting is given that the norm alone can follow."""
-        return self.decision == "clusters" and not self.tolerance and not self.precedence
+        told = any(getattr(self, name) for name in FOR_NORM)
+        return self.decision == "clusters" and not told
 
     def _check_names(self) -> None:
         # Imported here because the registries need SciPy, which `--help` must not wait for.

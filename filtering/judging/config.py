@@ -25,6 +25,11 @@ FOR_NORM = ("precedence", "keep", "optional", "critical", "tolerance")
 """Settings that only the score norm takes."""
 JUDGED_BY = ("auto", "w", "leave-one-out")
 """What can be made of equation 3."""
+WITHOUT_STEPS = {
+    "moments": "judges without sub-tasks and ",
+    "combined": "judges by moments too, which know no sub-tasks, and ",
+}
+"""Why a score does not take them."""
 DECISIONS = ("learned", "clusters")
 """Ways to decide who is flagged."""
 
@@ -123,9 +128,8 @@ class JudgingConfig:
         given = [name for name in FOR_NORM if getattr(self, name)]
         if not given or self.score in ("auto", "norm"):
             return
-        why = "judges without sub-tasks and " * (self.score == "moments")
         raise ConfigError(
-            f"The score '{self.score}' {why}takes no {given[0]}; "
+            f"The score '{self.score}' {WITHOUT_STEPS.get(self.score, '')}takes no {given[0]}; "
             "run 'teasim filter' again with '--score norm'."
         )
 

@@ -277,6 +277,11 @@ def test_impossible_graphs_are_refused(pairs, message: str) -> None:
             "filter' again with '--score norm'.",
         ),
         (
+            {"keep": (("a", "b"),), "score": "combined"},
+            "The score 'combined' judges by moments too, which know no sub-tasks, and takes no "
+            "keep; run 'teasim filter' again with '--score norm'.",
+        ),
+        (
             {"optional": ("a", "b"), "critical": ("b",)},
             "'b' cannot be both optional and critical; leave out one.",
         ),
@@ -318,3 +323,11 @@ def test_the_verb_takes_a_precedence_and_writes_it_down(tmp_path: Path) -> None:
     found = DemoFilter(config).fit(SequencePool.open(tmp_path / "labels"))
     assert np.flatnonzero(found.flagged_).tolist() == [11, 12]
     assert "breaks the rule: turn_off_oven before add_water" in found.reasons_[11]
+
+
+def test_videos_alone_are_judged_by_the_norm_where_rules_name_their_steps(toy_pool) -> None:
+    assert FilterConfig().for_source(toy_pool).score == "combined"
+    for rule in ({"optional": ("step 1",)}, {"precedence": (("step 1", "step 2"),)}):
+        assert FilterConfig(**rule).for_source(toy_pool).score == "norm"
+    with pytest.raises(ConfigError, match="'moments' judges without sub-tasks and takes no crit"):
+        FilterConfig(segmenter="agreement", critical=("step 1",)).for_source(toy_pool)
