@@ -157,8 +157,6 @@ def basis(fitted: "DemoFilter") -> str:
 
 
 def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
-    from filtering.demo_filter import caution
-
     print(basis(fitted))
     print(f"cameras looked at: {', '.join(fitted.looked_at_) or 'none'}")
     confidence = fitted.segments_.confidence()
@@ -168,16 +166,13 @@ def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
         print(f"{found}, recognised with a mean probability of {confidence:.2f}.")
     names = {demo.demo_id: demo.name for demo in pool.episodes}
     for row in fitted.table():
-        if row.flagged:
+        if row.reason:
             print(f"{names[row.demo_id]}  weight {row.weight:.2f}  {row.reason}")
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
     for note in fitted.notes_:
         print(note)
-    for words in fitted.decision_.words if fitted.decision_ else ():
-        print(f"{words}.")
-    warning = caution(len(fitted.weights_))
-    if warning is not None:
-        print(warning)
+    for words in fitted.words_:
+        print(words)
 
 
 def _fit(command: FitCommand) -> int:

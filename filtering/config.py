@@ -7,7 +7,8 @@ from typing import Annotated
 import tyro
 
 from filtering.features.config import POOLED
-from filtering.judging.config import JudgingConfig
+from filtering.judging.config import FOR_NORM, JudgingConfig
+from filtering.vision.pretrained import LITE, Backbone
 from teasim.common.errors import ConfigError
 from teasim.pool.source import Source
 
@@ -15,6 +16,8 @@ Cameras = Annotated[
     tuple[str, ...], tyro.conf.arg(name="camera", metavar="NAME"), tyro.conf.UseAppendAction
 ]
 """Names of cameras; on the command line `--camera NAME`, which may be repeated."""
+Frames = Annotated[int, tyro.conf.arg(aliases=["--frames"])]
+"""A number of frames; on the command line also `--frames`."""
 
 
 AUTO = "auto"
@@ -45,8 +48,15 @@ class FilterConfig(JudgingConfig):
     effects: bool = True
     """Compare the video before and after each segment: an ineffective step counts like one left
     out. For the score norm."""
-    frames_per_segment: int = 64
-    """Largest number of frames used per segment (paper section 3.2). For the score equation3."""
+    frames_per_segment: Frames = 64
+    """Largest number of frames used per segment (paper section 3.2); with vgg16 exactly so many,
+    those of shorter segments repeated. For the score equation3."""
+    backbone: str = LITE
+    """Network that looks at the frames: efficientnet-lite0, or vgg16 of the paper, at 224 x 224
+    pixels. For the score equation3 with pooled features."""
+    backbone_weights: str = ""
+    """File with the weights of vgg16: safetensors or a state dict of torch, with the names of
+    torchvision."""
     background: str = "median"
     """Background subtraction: none, median or mog2. For the score equation3."""
     features: str = POOLED
@@ -64,8 +74,17 @@ class FilterConfig(JudgingConfig):
         super().__post_init__()
         if self.frames_per_segment < 1:
             raise ConfigError(f"frames_per_segment is {self.frames_per_segment}; choose 1 or more.")
-        if self.score != "equation3" and self.features != POOLED:
-            raise ConfigError(f"The score '{self.score}' takes no features; choose equation3.")
+        for name, usual in (("features", POOLED), ("backbone", LITE)):
+            if self.score != "equation3" and getattr(self, name) != usual:
+                raise ConfigError(f"The score '{self.score}' takes no {name}; choose equation3.")
+        if self.features != POOLED and self.backbone != LITE:
+            raise ConfigError("The features of a folder have a backbone already; leave it out.")
+        self.network  # noqa: B018  checks both
+
+    @property
+    def network(self) -> Backbone:
+        """The network that looks at the frames of segments."""
+        return Backbone(self.backbone, self.backbone_weights)
 
     def for_source(self, source: Source) -> "FilterConfig":
         """Return these settings with `auto` replaced by what it stands for in a source.
@@ -91,7 +110,8 @@ class FilterConfig(JudgingConfig):
     @property
     def _is_plain(self) -> bool:
         """Whether no setting is given that the norm alone can follow."""
-        return self.decision == "clusters" and not self.tolerance and not self.precedence
+        told = any(getattr(self, name) for name in FOR_NORM)
+        return self.decision == "clusters" and not told
 
     def _check_names(self) -> None:
         # Imported here because the registries need SciPy, which `--help` must not wait for.

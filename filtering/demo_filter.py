@@ -18,10 +18,11 @@ from filtering.features.config import POOLED
 from filtering.features.extraction import segment_features
 from filtering.features.reduction import reduce_features
 from filtering.judging.evidence import Evidence
-from filtering.judging.explain import Finding, explain
+from filtering.judging.explain import ODD, Finding, explain, kept_though
 from filtering.judging.judgement import Judgement
 from filtering.judging.judges import judge_named
-from filtering.judging.thresholds import group_weights, probability_incorrect
+from filtering.judging.summary import PoolSummary, summarise
+from filtering.judging.thresholds import DIGITS, group_weights, probability_incorrect
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation, labels_at
 from filtering.vision.frame_features import FrameSource
@@ -42,7 +43,7 @@ FEW_DEMOS = 4
 """Number of demonstrations up to which `caution` warns of the limits of the result."""
 TOO_SHORT = "Some videos are too short for moments, so that only the found sub-tasks are judged."
 """Note on a pool with videos of few moments."""
-ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features")
+ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features", "backbone")
 """Settings that need pictures."""
 
 
@@ -91,8 +92,11 @@ from the whole video.
         flagged_ (D,): True for demonstrations called incorrect.
         groups_ (D,): group, 0 is the best.
         group_names_: what each group has in common; empty where only the weights define it.
-        reasons_: a sentence for each flagged demonstration, else "".
+        reasons_: a sentence for each flagged demonstration, and for each kept one whose weight is
+            below 0.8, else "".
         findings_: unusual steps of each demonstration, the most important one first.
+        summary_: ways of carrying out the task, and risks of steps; None for the score moments.
+        words_: sentences about the pool as a whole.
         threshold_: weight below which a demonstration is flagged; 0 when there is none.
         trust_ (D,): influence on the norm, in [0, 1]; w of equation 3, of sum M.
         objective_: value of equation 3 [nats per step]; None for another score.
@@ -114,6 +118,8 @@ from the whole video.
     group_names_: tuple[str, ...]
     reasons_: tuple[str, ...]
     findings_: tuple[tuple[Finding, ...], ...]
+    summary_: PoolSummary | None
+    words_: tuple[str, ...]
     threshold_: float
     trust_: NDArray[np.float64]
     objective_: float | None
@@ -149,6 +155,7 @@ from the whole video.
         judge = judges.get(self.chosen_.score, self._by_segments)
         self._seen: set[str] = set()
         self._learn(judge(pool, workers), pool.fps)
+        self._sum_up()
         self.looked_at_ = tuple(camera for camera in pool.cameras if camera in self._seen)
         self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
         return self
@@ -317,6 +324,7 @@ from the whole video.
             frames_per_segment=self.config.frames_per_segment,
             background=self.config.background,
             workers=workers,
+            backbone=self.config.network,
         )
         return reduce_features(features)
 
@@ -324,12 +332,11 @@ from the whole video.
         self.weights_ = judgement.weights
         self.losses_ = judgement.losses
         self.decision_ = judgement.decision
-        if judgement.probabilities is not None:
-            self.probabilities_ = judgement.probabilities
-        elif judgement.decision is not None:
-            self.probabilities_ = judgement.decision.probabilities
-        else:
-            self.probabilities_ = probability_incorrect(judgement.losses)
+        self.probabilities_ = (
+            probability_incorrect(judgement.losses)
+            if judgement.probabilities is None
+            else judgement.probabilities
+        )
         self.trust_ = judgement.trust
         self.objective_ = judgement.objective
         self.groups_ = judgement.grouping.groups
@@ -337,10 +344,27 @@ from the whole video.
         self.flagged_ = judgement.grouping.flagged
         self.threshold_ = judgement.grouping.threshold
         self.findings_ = judgement.findings
-        sentences = judgement.reasons or [explain(found, fps) for found in judgement.findings]
+        sentences = judgement.reasons or [
+            explain(found, fps, judgement.otherwise) for found in judgement.findings
+        ]
         self.reasons_ = tuple(
-            sentence if flagged else ""
-            for sentence, flagged in zip(sentences, self.flagged_, strict=True)
+            sentence if flagged else kept_though(sentence) if weight < ODD else ""
+            for sentence, flagged, weight in zip(
+                sentences, self.flagged_, self.weights_.round(DIGITS), strict=True
+            )
+        )
+
+    def _sum_up(self) -> None:
+        """Say what holds for the pool as a whole."""
+        self.summary_ = None
+        if self.chosen_.score != MOMENTS:
+            self.summary_ = summarise(self.segments_, self.weights_, self.flagged_, self.config)
+        decided = [f"{words}." for words in self.decision_.words] if self.decision_ else []
+        warning = caution(len(self.weights_))
+        self.words_ = (
+            *decided,
+            *(self.summary_.words if self.summary_ else ()),
+            *([warning] if warning else []),
         )
 
     @contextmanager

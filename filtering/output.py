@@ -4,6 +4,7 @@ import platform
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -109,7 +110,7 @@ def write_filter_output(
             demos=demo_views(pool, fitted, folder, workers=workers),
             threshold=fitted.threshold_,
             subtasks=fitted.segments_.subtasks,
-            sections=sections,
+            sections=[*([_words_section(fitted)] if fitted.words_ else []), *sections],
             unit=Clock(pool.fps).unit,
         )
     except Exception as error:
@@ -158,6 +159,9 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "probability_incorrect": _by_demo(fitted, fitted.probabilities_),
         "probability_is": PROBABILITY if fitted.decision_ is None else LEARNED,
         "decision": _decision_record(fitted),
+        "words": list(fitted.words_),
+        "sequences": _sequences_record(fitted),
+        "risk_of_leaving_out": fitted.summary_.risks if fitted.summary_ else None,
         "seconds": {stage: round(spent, 3) for stage, spent in fitted.timings_.items()},
     }
 
@@ -176,6 +180,23 @@ def _decision_record(fitted: DemoFilter) -> dict[str, Any] | None:
         "expected_recall": found.expected_recall,
         "model_sha256": found.sha256,
     }
+
+
+def _sequences_record(fitted: DemoFilter) -> list[dict[str, Any]] | None:
+    """Return each different sequence of steps, the most frequent first; None without steps."""
+    if fitted.summary_ is None:
+        return None
+    names = [row.demo_id for row in fitted.table()]
+    return [
+        {"steps": list(way.steps), "demonstrations": [names[row] for row in way.rows]}
+        for way in fitted.summary_.ways.all
+    ]
+
+
+def _words_section(fitted: DemoFilter) -> ReportSection:
+    """Return the part of the page that says what holds for the pool as a whole."""
+    items = "".join(f"<li>{escape(words)}</li>" for words in fitted.words_)
+    return ReportSection("The pool as a whole", f"<ul>{items}</ul>")
 
 
 def _by_demo(fitted: DemoFilter, values: NDArray[np.float64]) -> dict[str, float]:

@@ -22,7 +22,7 @@ from filtering.features.config import (
 from filtering.features.generator import FeatureGenerator
 from filtering.features.learned import LearnedFeatures, LookConfig
 from filtering.vision.background import subtraction_named
-from filtering.vision.pretrained import describe_fitted, feature_recipe
+from filtering.vision.pretrained import Backbone, describe_fitted
 from teasim.common.checkpoint import CheckpointKind
 from teasim.common.errors import ConfigError
 
@@ -80,7 +80,7 @@ def save_features(learned: LearnedFeatures, folder: Path) -> None:
     description = {
         "config": asdict(generator.config),
         "look": asdict(learned.look),
-        "features": feature_recipe(),
+        "features": learned.look.backbone.recipe(),
         "history": list(generator.classifier_.history_),
     }
     GENERATOR.save(folder, save_tensors(fitted | weights), description)
@@ -93,18 +93,27 @@ def load_features(folder: Path) -> LearnedFeatures:
         CheckpointError: `folder` holds none, some of another version or for other feature maps, or
             damaged ones.
     """
-    description = describe_fitted(GENERATOR, folder, "feature maps")
+    description = describe_fitted(GENERATOR, folder, "feature maps", _backbone)
     weights = GENERATOR.weights(folder, description)
     bottleneck = load_bottleneck(folder)
     try:
         generator = _restore_generator(description, weights)
-        look = LookConfig(**description["look"])
+        look = LookConfig(**description["look"] | {"backbone": _backbone(description)})
         subtraction_named(look.background)
     except DAMAGED as error:
         raise GENERATOR.mismatch(folder) from error
     if bottleneck.config.channels != len(generator.thresholds_):
         raise GENERATOR.mismatch(folder)
     return LearnedFeatures(look, bottleneck, generator)
+
+
+def _backbone(description: dict[str, Any]) -> Backbone:
+    """Return the network of a description; one that names none used the usual one."""
+    look = description.get("look")
+    named = look.get("backbone") if isinstance(look, dict) else None
+    if not isinstance(named, dict):
+        return Backbone()
+    return Backbone(str(named.get("name")), str(named.get("weights")))
 
 
 def _restore_generator(description: dict[str, Any], weights: bytes) -> FeatureGenerator:

@@ -5,7 +5,7 @@ Learned from the labelled demonstrations of a segmenter and kept beside it; a se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from filtering.features.bottleneck import Bottleneck
 from filtering.features.config import BottleneckConfig, GeneratorConfig
 from filtering.features.extraction import segment_maps
 from filtering.features.generator import FeatureGenerator
+from filtering.vision.pretrained import Backbone
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
 from teasim.common.workers import IN_PROCESS, Workers
@@ -31,6 +32,8 @@ class LookConfig:
     """Largest number of frames used per segment."""
     background: str = "median"
     """Background subtraction: none, median or mog2."""
+    backbone: Backbone = field(default_factory=Backbone)
+    """Pretrained network whose feature maps are used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +123,8 @@ class _Task:
 
 def _maps(task: _MapsTask) -> list[NDArray[np.float16]]:
     look = task.look
-    return segment_maps(task.clip, task.spans, look.frames_per_segment, look.background)
+    count, background = look.frames_per_segment, look.background
+    return segment_maps(task.clip, task.spans, count, background, look.backbone)
 
 
 def _describe(task: _Task) -> NDArray[np.float64]:

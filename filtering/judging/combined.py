@@ -15,10 +15,9 @@ import numpy as np
 
 from filtering.judging.explain import explain
 from filtering.judging.judgement import Judgement
+from filtering.judging.norm.cut import NATURES
 from filtering.judging.thresholds import Grouping, as_many_as_asked
 
-NATURES = ("kept", "out of order", "steps left out", "extra steps")
-"""Groups of both, the best first."""
 CONFIRMED = 0.85
 """Least agreement of sub-tasks with counterparts, see `confirmed.confirmation`. In pools of the
 scenes TUNED_ON and of tea-making it is 0.85 or more, but 0.5 to 0.65 where a scene's sub-tasks were

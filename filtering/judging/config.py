@@ -4,20 +4,32 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
+import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
-from filtering.judging.norm.precedence import Pairs, read_precedence
+from filtering.judging.rules.order import BETWEEN, Pairs, check_pairs, pairs_of
 from teasim.common.errors import ConfigError
 
-PRECEDENCE_FILE = PrimitiveConstructorSpec(
-    nargs=1,
-    metavar="FILE",
-    instance_from_str=lambda words: read_precedence(words[0]),
+PAIRS = PrimitiveConstructorSpec(
+    nargs="*",
+    metavar="RULE",
+    instance_from_str=pairs_of,
     is_instance=lambda value: isinstance(value, tuple),
-    str_from_instance=lambda pairs: [str(list(pairs))],
+    str_from_instance=lambda pairs: [BETWEEN.join(pair) for pair in pairs],
 )
-"""How the command line reads precedence: from a file."""
+"""How the command line reads pairs of sub-tasks: 'a before b', or a file."""
+SubtaskPairs = Annotated[Pairs, PAIRS]
+SubtaskNames = Annotated[tuple[str, ...], tyro.conf.arg(metavar="SUBTASK")]
 
+FOR_NORM = ("precedence", "keep", "optional", "critical", "tolerance")
+"""Settings that only the score norm takes."""
+JUDGED_BY = ("auto", "w", "leave-one-out")
+"""What can be made of equation 3."""
+WITHOUT_STEPS = {
+    "moments": "judges without sub-tasks and ",
+    "combined": "judges by moments too, which know no sub-tasks, and ",
+}
+"""Why a score does not take them."""
 DECISIONS = ("learned", "clusters")
 """Ways to decide who is flagged."""
 
@@ -40,19 +52,30 @@ class JudgingConfig:
     decision: str = "clusters"
     """How losses become flags: clusters (a cut between clusters of the losses), or learned (the
     probability of being incorrect, given the whole pool). Only clusters are used where groups,
-    threshold, tolerance or precedence are given, and for the score equation3."""
+    threshold or tolerance are given, and for the score equation3."""
     cost: float = 2.0
     """False alarms that a miss is worth: the learned decision flags demonstrations that are
     incorrect with a probability above 1 / (1 + cost)."""
     tolerance: float = 0.0
     """Tolerance for behaviour that a minority shares, from 0 to below 1; 0.2 keeps legal orders
     that a few demonstrations share. For the score norm."""
-    precedence: Annotated[Pairs, PRECEDENCE_FILE] = ()
-    """File with lines 'a before b', or a JSON list of pairs [a, b]: the only rules of order that
-    count. For the score norm."""
+    precedence: SubtaskPairs = ()
+    """Rules 'a before b', in words, in a file with such lines, or in a JSON list of pairs [a, b].
+    Demonstrations that break one are flagged; no other order is wrong. For the score norm."""
+    keep: SubtaskPairs = ()
+    """Orders 'a before b' that are legal, even if few demonstrations show them; written like
+    precedence. For the score norm."""
+    optional: SubtaskNames = ()
+    """Sub-tasks that may be left out. For the score norm."""
+    critical: SubtaskNames = ()
+    """Sub-tasks that must not be left out: those who do are flagged. For the score norm."""
     solver: str = "annealed"
     """Solver of equation 3: annealed, alternating, exact (at most 24 different demonstrations) or
     published (SLSQP of SciPy, without a ridge)."""
+    judged_by: str = "auto"
+    """What equation 3 says of a demonstration: w (the weight that the solver gives it, as
+    published), or leave-one-out (how surprising it is to models of the others). auto: w for the
+    solver published, leave-one-out for the others."""
     trusted_share: float = 0.5
     """M / D, share of the demonstrations that equation 3 trusts, between 0 and 1."""
     ridge: float = 0.01
@@ -70,6 +93,8 @@ class JudgingConfig:
             raise ConfigError(
                 f"Unknown decision '{self.decision}'; choose {' or '.join(DECISIONS)}."
             )
+        if self.judged_by not in JUDGED_BY:
+            raise ConfigError(f"judged_by is '{self.judged_by}'; choose {', '.join(JUDGED_BY)}.")
         if not 0.0 < self.cost < math.inf:
             raise ConfigError(f"cost is {self.cost}; choose a number above 0.")
         if not 0.0 < self.trusted_share < 1.0:
@@ -78,10 +103,7 @@ class JudgingConfig:
             )
         if not 0.0 < self.ridge < math.inf:
             raise ConfigError(f"ridge is {self.ridge}; choose a number above 0.")
-        if self.score not in ("auto", "norm") and (self.precedence or self.tolerance):
-            raise ConfigError(
-                f"The score '{self.score}' takes neither precedence nor tolerance; choose norm."
-            )
+        self._check_rules()
         if not isinstance(self.threshold, str):
             self._check_number(self.threshold)
 
@@ -89,8 +111,27 @@ class JudgingConfig:
     def learns(self) -> bool:
         """Whether the learned decision is used."""
         plain = self.groups == "auto" and self.threshold == "auto"
-        exact = not self.tolerance and not self.precedence
-        return self.decision == "learned" and self.score in ("auto", "norm") and plain and exact
+        named = self.score in ("auto", "norm")
+        return self.decision == "learned" and named and plain and not self.tolerance
+
+    @property
+    def by_w(self) -> bool:
+        """Whether the weights of equation 3 themselves judge, as published."""
+        return self.judged_by == "w" or (self.judged_by == "auto" and self.solver == "published")
+
+    def _check_rules(self) -> None:
+        for name in ("precedence", "keep"):
+            check_pairs(getattr(self, name), name)
+        both = sorted(set(self.optional) & set(self.critical))
+        if both:
+            raise ConfigError(f"'{both[0]}' cannot be both optional and critical; leave out one.")
+        given = [name for name in FOR_NORM if getattr(self, name)]
+        if not given or self.score in ("auto", "norm"):
+            return
+        raise ConfigError(
+            f"The score '{self.score}' {WITHOUT_STEPS.get(self.score, '')}takes no {given[0]}; "
+            "run 'teasim filter' again with '--score norm'."
+        )
 
     def _check_number(self, threshold: float) -> None:
         if not 0.0 < threshold < 1.0:

@@ -1,10 +1,13 @@
-"""One sentence about a flagged demonstration: which step is unusual, where, and why."""
+"""One sentence about a demonstration: which step is unusual, where, and why."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from teasim.pool import Span
 
+ODD = 0.8
+"""Weight below which it is also said of a kept demonstration what was odd. A round number: a
+learner would feel the missing fifth."""
 GRAVE = 0.5
 """Share of the largest surprise from which a finding may be named first."""
 
@@ -56,28 +59,39 @@ class Finding:
     """Segment in which the expected sub-task came later; None where it did not."""
     ineffective: Span | None = None
     """Segment of the expected sub-task when it was carried out without effect; else None."""
+    extra: Span | None = None
+    """Segment of a step that few others carry out, or that often; else None."""
+    rule: str = ""
+    """Rule of the user that is broken here, in words; empty where the pool alone accuses."""
 
 
-def explain(findings: Sequence[Finding], fps: float | None) -> str:
+NO_STEP = "No single step stands out, but all steps together are less usual than most."
+"""What is said where there is no finding."""
+
+
+def explain(findings: Sequence[Finding], fps: float | None, otherwise: str = NO_STEP) -> str:
     """Return one sentence about the first finding and all other missing sub-tasks.
 
     Args:
         findings: of one demonstration, the most important one first.
         fps: frames per second; None where it is not known.
+        otherwise: what to say where there is no finding.
     """
     if not findings:
-        return (
-            "No single step stands out, but all steps together are less usual than those of the "
-            "kept demonstrations."
-        )
+        return otherwise
     clock = Clock(fps)
     named = findings[0]
     if named.ineffective is not None:
         when = clock.during(named.ineffective)
         sentence = f"'{named.expected}' was carried out ({when}), but it had no visible effect"
+    elif named.extra is not None:
+        when = clock.during(named.extra)
+        sentence = f"'{named.seen}' was carried out ({when}), which few others do so often"
+    elif named.rule:
+        sentence = _breach(named, clock)
     else:
         sentence = f"{_place(named, clock)} {_expectation(named)}, {_sight(named, clock)}"
-    if named.missing:
+    if named.missing and not named.rule:
         sentence += f"; '{named.expected}' is missing from the whole video"
     elif named.came is not None:
         sentence += f"; '{named.expected}' came later ({clock.during(named.came)})"
@@ -91,10 +105,24 @@ def explain(findings: Sequence[Finding], fps: float | None) -> str:
     return sentence + "."
 
 
+def kept_though(sentence: str) -> str:
+    """Return what was odd about a demonstration that is kept, given the sentence about it."""
+    return f"Kept, though odd: {sentence}"
+
+
 def gravest(findings: Sequence[Finding]) -> list[Finding]:
     """Return the findings at least GRAVE times as surprising as the worst one."""
     worst = max(item.surprise for item in findings)
     return [item for item in findings if item.surprise >= GRAVE * worst]
+
+
+def _breach(finding: Finding, clock: Clock) -> str:
+    """Return how a rule of the user is broken; where nobody does a step, it has no usual place."""
+    if not finding.missing:
+        return f"This demonstration breaks the rule: {finding.rule}; {_sight(finding, clock)}"
+    nowhere = finding.after is None and finding.seen is None
+    where = "" if nowhere else f" (expected at {clock.at(finding.frame)})"
+    return f"{finding.rule}, and it is missing from the whole video{where}"
 
 
 def _place(finding: Finding, clock: Clock) -> str:

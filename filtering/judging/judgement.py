@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from filtering.judging.explain import Finding
+from filtering.judging.explain import NO_STEP, Finding
 from filtering.judging.thresholds import Grouping
 from teasim.common.arrays import Array
 
@@ -30,7 +30,10 @@ class Judgement:
     reasons: tuple[str, ...] | None = None
     """Per demonstration a sentence on the most important finding; None where the findings name
     sub-tasks and `explain` writes it."""
-    probabilities: Array | None = None
-    """(D,) probability of being incorrect; None where the losses alone tell it."""
     decision: "PoolDecision | None" = None
     """The learned decision; None where clusters decided."""
+    probabilities: Array | None = None
+    """(D,) probability that each demonstration is incorrect, with the rules of the user; None
+    where it follows from the losses by `probability_incorrect`."""
+    otherwise: str = NO_STEP
+    """Sentence about a demonstration without findings."""

@@ -12,6 +12,10 @@ NOTABLE = 1.0
 """Smallest surprise that is marked on the timeline; the largest one is always marked [nats]."""
 
 
+class Supposed(Span):
+    """A step that a demonstration leaves out, and may, where it would usually be."""
+
+
 def usual_order(labels: Sequence[Sequence[int]], weights: Array, n_subtasks: int) -> Array:
     """Return (T, T): how often sub-task a first comes before b where both occur, 0.5 if never.
 
@@ -59,16 +63,31 @@ class Places:
     def finding(self, demo: int, row: int, label: int, surprise: float) -> Finding:
         """Return the finding that `label` was expected after `row` segments; T is the end."""
         spans = self.segments[demo]
-        seen = spans[row] if row < len(spans) else None
+        before, later = ([s for s in part if _seen(s)] for part in (spans[:row], spans[row:]))
+        seen = later[0] if later else None
         expected = self.subtasks[label] if label < len(self.subtasks) else None
         return Finding(
             expected=expected,
             seen=seen.subtask if seen else None,
-            after=spans[row - 1] if row else None,
-            frame=seen.start if seen else spans[-1].stop,
+            after=before[-1] if before else None,
+            frame=seen.start if seen else before[-1].stop,
             missing=expected is not None and all(s.subtask != expected for s in spans),
             surprise=surprise,
-            came=next((s for s in spans[row:] if s.subtask == expected), None),
+            came=next((s for s in later if s.subtask == expected), None),
+        )
+
+    def extra(self, demo: int, label: int, surprise: float) -> Finding:
+        """Return the finding that `label` was carried out once more than usual."""
+        spans = self.segments[demo]
+        last = max(row for row, span in enumerate(spans) if span.subtask == self.subtasks[label])
+        return Finding(
+            expected=None,
+            seen=spans[last].subtask,
+            after=spans[last - 1] if last else None,
+            frame=spans[last].start,
+            missing=False,
+            surprise=surprise,
+            extra=spans[last],
         )
 
     def ineffective(self, demo: int, losses: Array) -> list[Finding]:
@@ -86,3 +105,7 @@ class Places:
             )
             for row in np.flatnonzero(losses > 0).tolist()
         ]
+
+
+def _seen(span: Span) -> bool:
+    return not isinstance(span, Supposed)

@@ -57,7 +57,7 @@ class DemoView:
     group: str
     """What its group has in common, empty where only the weights define it."""
     reason: str
-    """One sentence, empty for a kept demonstration."""
+    """One sentence; empty for a kept demonstration that is usual."""
     seconds: float
     """Length of the video [unit of the page, seconds unless it says otherwise]."""
     segments: tuple[Segment, ...]

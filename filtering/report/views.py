@@ -53,7 +53,7 @@ def _view(pool: Source, fitted: DemoFilter, row: int, video: str | None) -> Demo
         reason=fitted.reasons_[row],
         seconds=clock.time(episode.length),
         segments=tuple(Segment(s.subtask, clock.time(s.start), clock.time(s.stop)) for s in spans),
-        marks=marks_of(fitted.findings_[row], clock) if flagged else (),
+        marks=marks_of(fitted.findings_[row], clock) if fitted.reasons_[row] else (),
         video=video,
     )
 
@@ -69,6 +69,8 @@ def marks_of(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
 def _mark(finding: Finding, clock: Clock) -> Mark:
     if finding.ineffective is not None:
         text = f"{finding.ineffective.subtask} was ineffective"
+    elif finding.extra is not None:
+        text = f"{finding.extra.subtask} is extra"
     elif finding.expected is None:
         text = "the end was expected"
     else:

@@ -6,6 +6,7 @@ from typing import Annotated
 import tyro
 
 from filtering.segmentation.scaling import SCALINGS
+from filtering.vision.pretrained import LITE
 from teasim.common.errors import ConfigError
 
 Advanced = tyro.conf.Suppress
@@ -78,5 +79,10 @@ class FitConfig:
     labelled segment of each sub-task."""
     features: bool = False
     """Also learn the features of the paper from the first camera, for `filter --features`."""
+    backbone: str = LITE
+    """Network whose feature maps these features are learned from: efficientnet-lite0, or vgg16 of
+    the paper."""
+    backbone_weights: str = ""
+    """File with the weights of vgg16: safetensors or a state dict of torch."""
     network: Annotated[MSTCNConfig, tyro.conf.OmitArgPrefixes] = field(default_factory=MSTCNConfig)
     """Settings of the network; its seed also draws the demonstrations."""

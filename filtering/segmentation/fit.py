@@ -19,6 +19,7 @@ from filtering.segmentation.mstcn.training import LabelledVideo, MSTCNLearner, l
 from filtering.segmentation.scoring import ScoresByPart, score_episodes, scores_json
 from filtering.vision.frame_features import FrameSource, frame_features, sampled_frames
 from filtering.vision.frames import chosen_cameras, frame_rate
+from filtering.vision.pretrained import Backbone
 from teasim.common.errors import ConfigError, PoolError
 from teasim.common.files import check_new_folder
 from teasim.common.workers import IN_PROCESS, Workers
@@ -62,13 +63,14 @@ def fit_segmenter(
     began = time.perf_counter()
     pool = open_source(source)
     check_new_folder(out)
+    network = Backbone(config.backbone, config.backbone_weights)
     require_sound(pool)
     print_notes(pool)
     frames = FrameSource(chosen_cameras(pool, config.cameras) or pool.cameras, config.rate)
     chosen, others = _divide(pool, config)
     subtasks = pool.subtasks or tuple(sorted(_shown(chosen)))
     segmenter, history = _fit(pool, chosen, subtasks, frames, config=config, workers=workers)
-    look = LookConfig(frames.cameras[0])
+    look = LookConfig(frames.cameras[0], backbone=network)
     learned = learn_features(chosen, subtasks, look, workers=workers) if config.features else None
     tried = [*chosen, *_draw(others, CHECKED, config.network.seed)]
     result = FitResult(

@@ -185,9 +185,15 @@ def describe_clip(clip: Clip, wanted: NDArray[np.int64]) -> NDArray[np.float32]:
     return np.concatenate(parts)
 
 
-def clip_key(clip: Clip, recipe: Sequence[Any]) -> str:
-    """Hash the pictures of a clip and all that is done to them (anything JSON can hold)."""
-    content = json.dumps([clip.digest(), *feature_recipe(), *recipe])
+def clip_key(clip: Clip, recipe: Sequence[Any], network: Sequence[str] = ()) -> str:
+    """Hash the pictures of a clip and all that is done to them (anything JSON can hold).
+
+    Args:
+        clip: where the pictures are.
+        recipe: what is done to them.
+        network: recipe of the network that looks at them; empty for the usual one.
+    """
+    content = json.dumps([clip.digest(), *(network or feature_recipe()), *recipe])
     return hashlib.sha256(content.encode()).hexdigest()
 
 

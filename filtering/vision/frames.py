@@ -32,8 +32,16 @@ def uniform_indices(start: int, stop: int, count: int) -> NDArray[np.int64]:
     return (start + (np.arange(count) + 0.5) * length / count).astype(np.int64)
 
 
-def segment_indices(spans: tuple[Span, ...], count: int) -> list[NDArray[np.int64]]:
-    """Return the frames to look at in each segment."""
+def segment_indices(
+    spans: tuple[Span, ...], count: int, *, exact: bool = False
+) -> list[NDArray[np.int64]]:
+    """Return the frames to look at in each segment: at most `count`, or exactly so many.
+
+    Exactly so many means that frames of a shorter segment are repeated evenly.
+    """
+    if exact:
+        parts = (np.arange(count) + 0.5) / count
+        return [(span.start + parts * (span.stop - span.start)).astype(np.int64) for span in spans]
     return [uniform_indices(span.start, span.stop, count) for span in spans]
 
 

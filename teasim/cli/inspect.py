@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
@@ -14,10 +14,12 @@ from teasim.common.cli import parse
 
 if TYPE_CHECKING:
     from teasim.pool.source import Source
+    from teasim.pool.ways.ways import Ways
 
 EXAMPLES = (
     "teasim inspect pool",
     "teasim inspect pool --leakage --json > pool.json",
+    "teasim inspect films --sequences --segments findings",
 )
 
 
@@ -30,6 +32,11 @@ class InspectSettings:
     leakage: tyro.conf.FlagCreatePairsOff[bool] = False
     """Also show how well single clues, such as the duration, tell incorrect from correct
     demonstrations (AUROC: 0.5 is chance). Needs a pool with labels of correctness."""
+    sequences: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Also show the different sequences of steps: how many demonstrations follow each, what most
+    do, and steps that may be optional. Reads logged sub-tasks, or --segments."""
+    segments: Path | None = None
+    """For --sequences: segments.csv of `teasim filter`, or the folder it is in."""
     fps: float | None = None
     """Frames per second [1/s] of a source that does not store them."""
     repair: Path | None = None
@@ -46,7 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 when the source is sound, 1 when it is damaged.
 
     Raises:
-        ConfigError: `--fps` is given for a source that stores its frame rate.
+        ConfigError: `--fps` is given for a source that stores its frame rate, or `--sequences` for
+            one without steps.
         PoolError: nothing readable is at the path, or `--leakage` lacks labels.
     """
     settings = parse(InspectSettings, argv, verb="inspect", examples=EXAMPLES)
@@ -58,16 +66,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     reader = reader_of(settings.source)
     source, problems = _open_and_check(settings)
     clues = _leakage(source) if settings.leakage and source is not None and not problems else None
+    ways = _ways(settings, None if problems else source)
     facts = None if source is None else facts_of(source)
     if settings.json:
         about = {"source": str(settings.source), "format": reader.name, "problems": problems}
-        print(json.dumps(json_of(facts, **about, leakage=clues), indent=2))
+        print(json.dumps(json_of(facts, **about, leakage=clues, **_shown(ways)), indent=2))
         return 1 if problems else 0
     if facts is not None:
         print(text_of(str(settings.source), reader.name, facts))
     print("\n".join([*problems, f"Integrity:      {problem_count(problems)}"]))
     if clues is not None:
         print(_leakage_text(clues))
+    if ways is not None:
+        from teasim.cli.sequences import sequences_text
+
+        print(sequences_text(ways))
     return 1 if problems else 0
 
 
@@ -113,6 +126,27 @@ def _repair(settings: InspectSettings, target: Path) -> int:
     if done.set_aside:
         print(f"{len(done.set_aside)} damaged ones were set aside in {done.root / SET_ASIDE}.")
     return 0
+
+
+def _ways(settings: InspectSettings, source: Source | None) -> Ways | None:
+    """The sequences of a sound source, if they are asked for.
+
+    Raises:
+        ConfigError: the source has no steps, or `--segments` is given without `--sequences`.
+        PoolError: the table of segments or the labels are damaged.
+    """
+    from teasim.cli.sequences import ways_of
+    from teasim.common.errors import ConfigError
+
+    if settings.segments is not None and not settings.sequences:
+        raise ConfigError("--segments is for --sequences; add '--sequences'.")
+    return ways_of(source, settings.segments) if settings.sequences and source else None
+
+
+def _shown(ways: Ways | None) -> dict[str, Any]:
+    from teasim.cli.sequences import sequences_json
+
+    return {} if ways is None else sequences_json(ways)
 
 
 def _leakage(source: Source) -> dict[str, float]:

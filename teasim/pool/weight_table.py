@@ -29,7 +29,7 @@ class WeightRow:
     group: int
     """Its cluster; 0 is the best."""
     reason: str
-    """One sentence naming the step and time span."""
+    """One sentence naming the step and time span; empty for a usual demonstration."""
     p_incorrect: float | None = None
     """Probability that it is incorrect, in [0, 1]; None in tables that do not have it."""
 

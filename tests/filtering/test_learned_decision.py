@@ -199,7 +199,6 @@ def test_weights_are_probabilities_of_being_correct() -> None:
         {"groups": "1"},
         {"threshold": 0.4},
         {"tolerance": 0.2},
-        {"precedence": (("step_0", "step_1"),)},
         {"score": "equation3"},
     ],
 )

@@ -8,7 +8,7 @@ import pytest
 from teasim.cli.inspect import main
 from teasim.common.errors import ConfigError, PoolError
 from teasim.pool import Pool
-from tests.toy_pool import SEQ_1, SEQ_2, copy_pool, make_toy_pool, strip_ground_truth
+from tests.toy_pool import SEQ_1, SEQ_2, copy_pool, make_toy_pool, strip_ground_truth, strip_labels
 
 
 def test_a_sound_pool_is_shown_in_full(toy_pool: Pool, capsys: pytest.CaptureFixture[str]) -> None:
@@ -173,3 +173,71 @@ def test_only_the_native_format_is_repaired(tmp_path: Path) -> None:
     (tmp_path / "groundTruth/a.txt").write_text("cut\n")
     with pytest.raises(ConfigError, match=r"MS-TCN folder; --repair works on a LeRobot data set"):
         main([str(tmp_path), "--repair", str(tmp_path / "sound")])
+
+
+WITHOUT_MILK = [name for name in SEQ_1 if name != "add_milk"]
+SEQUENCES = """\
+Sequences:      3 different in 6 demonstrations
+   3 x  turn_on_oven, add_tea_bag, add_sugar, add_milk, turn_off_oven,
+        add_water, stir
+   2 x  without add_milk (demonstrations 3, 4)
+   1 x  add_sugar before add_tea_bag (demonstrations 5)
+One order: 5 of 6 demonstrations keep it, one does not.
+Perhaps optional: 2 of 6 leave out add_milk. Only you know whether that is legal
+or a mistake: --optional add_milk or --critical add_milk.
+"""
+
+
+@pytest.fixture
+def varied(tmp_path: Path) -> Pool:
+    swapped = [SEQ_1[0], SEQ_1[2], SEQ_1[1], *SEQ_1[3:]]
+    demos = [SEQ_1, SEQ_1, SEQ_1, WITHOUT_MILK, WITHOUT_MILK, swapped]
+    return make_toy_pool(tmp_path / "varied", demos, size=16, frames_per_subtask=2)
+
+
+def test_sequences_are_counted_and_optional_steps_named(
+    varied: Pool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(varied.root), "--sequences"]) == 0
+    assert capsys.readouterr().out.endswith(SEQUENCES)
+    assert main([str(varied.root), "--sequences", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["sequences"][1] == {"steps": WITHOUT_MILK, "demonstrations": [3, 4]}
+    assert " ".join(told["words"]) == " ".join(SEQUENCES.split("\n", 5)[5].split())
+
+
+def test_sequences_of_found_segments_are_those_of_the_table(
+    varied: Pool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from teasim.pool.segments_table import segment_rows, write_segments_table
+
+    spans = [episode.spans() for episode in varied.episodes]
+    (tmp_path / "findings").mkdir()
+    write_segments_table(tmp_path / "findings" / "segments.csv", segment_rows(varied, spans))
+    bare = strip_labels(copy_pool(varied, tmp_path / "bare")).root
+    with pytest.raises(ConfigError) as caught:
+        main([str(bare), "--sequences"])
+    assert str(caught.value) == (
+        f"'{bare}' has no logged sub-tasks; run 'teasim filter {bare} -o findings' and add "
+        "'--segments findings'."
+    )
+    for table in (tmp_path / "findings", tmp_path / "findings" / "segments.csv"):
+        assert main([str(bare), "--sequences", "--segments", str(table)]) == 0
+        assert capsys.readouterr().out.endswith(SEQUENCES)
+
+
+def test_sequences_without_steps_are_refused_with_the_next_command(
+    varied: Pool, tmp_path: Path
+) -> None:
+    from teasim.pool.segments_table import segment_rows, write_segments_table
+
+    with pytest.raises(ConfigError, match=r"^--segments is for --sequences; add '--sequences'\.$"):
+        main([str(varied.root), "--segments", "x"])
+    some = [episode.spans() if episode.index else () for episode in varied.episodes]
+    write_segments_table(tmp_path / "some.csv", segment_rows(varied, some))
+    with pytest.raises(ConfigError) as caught:
+        main([str(varied.root), "--sequences", "--segments", str(tmp_path / "some.csv")])
+    assert str(caught.value) == (
+        f"The table of segments '{tmp_path / 'some.csv'}' does not know 'video 0'; run 'teasim "
+        f"filter {varied.root} -o findings' and add '--segments findings'."
+    )

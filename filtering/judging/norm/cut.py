@@ -33,8 +33,9 @@ rendered tea pools of docs/results.md and 50 Salads."""
 LEAST_SPREAD = 0.1
 """Least standard deviation of sqrt(loss) within the lower cluster [sqrt(nats)]. Chosen with
 VARIETY."""
-NATURES = ("kept", "out of order", "steps left out")
-"""Groups of demonstrations, the best first; an ineffective step counts as left out."""
+NATURES = ("kept", "out of order", "steps left out", "extra steps")
+"""Groups of demonstrations, the best first; an ineffective step counts as left out. Only the
+learned decision knows extra steps."""
 
 
 def decide(losses: Array, left_out: NDArray[np.bool_], groups: str) -> tuple[Array, Grouping]:
@@ -60,10 +61,18 @@ def decide(losses: Array, left_out: NDArray[np.bool_], groups: str) -> tuple[Arr
 
 
 def by_nature(
-    flagged: NDArray[np.bool_], left_out: NDArray[np.bool_]
+    flagged: NDArray[np.bool_],
+    left_out: NDArray[np.bool_],
+    extra: NDArray[np.bool_] | bool = False,
 ) -> tuple[NDArray[np.int64], tuple[str, ...]]:
-    """Return group numbers (D,) without gaps and the names of the groups that occur."""
-    natures = np.where(flagged, 1 + left_out, 0)
+    """Return group numbers (D,) without gaps and the names of the groups that occur.
+
+    Args:
+        flagged: (D,) True for demonstrations called incorrect.
+        left_out: (D,) True where omissions weigh more than the order.
+        extra: (D,) True where extra steps weigh more than both.
+    """
+    natures = np.where(flagged, np.where(extra, 3, 1 + left_out), 0)
     present, numbers = np.unique(np.append(0, natures), return_inverse=True)
     return numbers[1:].astype(np.int64), tuple(NATURES[n] for n in present)
 

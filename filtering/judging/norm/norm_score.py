@@ -137,7 +137,7 @@ def score_populations(
 def _score(counts: StepCounts, trust: Array) -> NormScore:
     usual = np.maximum(_log_odds(counts.occurs, 1.0, trust), 0)
     omitted = (1 - counts.occurs) * usual
-    order = np.maximum(_log_odds(counts.before, counts.both, trust), 0) * counts.binding
+    order = np.maximum(_log_odds(counts.before, counts.both, trust), 0)
     misplaced = order * (1 - counts.before) * counts.both
     broken = misplaced.reshape(counts.n_demos, -1)
     worst = broken.max(axis=1, initial=0.0)

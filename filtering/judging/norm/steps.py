@@ -55,8 +55,6 @@ class StepCounts:
     """(D, T, T) 1 where a and b both occur and differ."""
     follows: Array
     """(D, T + 1, T + 1) B_dst, how often t follows s directly."""
-    binding: Array
-    """(T, T) 1 where the order of a and b may count, 0 where it does not."""
 
     @property
     def n_demos(self) -> int:
@@ -67,17 +65,6 @@ class StepCounts:
     def n_subtasks(self) -> int:
         """T."""
         return self.occurs.shape[1]
-
-    def restricted(self, graph: Array) -> "StepCounts":
-        """Return counts in which only the order of `graph` (T, T), 1 for a before b, matters."""
-        related = np.maximum(graph, graph.T)
-        return StepCounts(
-            self.occurs,
-            self.before * related,
-            self.both * related,
-            np.zeros_like(self.follows),
-            graph,
-        )
 
 
 def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
@@ -96,7 +83,7 @@ def count_steps(demos: Sequence[StepList], n_subtasks: int) -> StepCounts:
     both = occurs[:, :, None] * occurs[:, None, :] * (1 - np.eye(n_subtasks))
     before = _precedence(owners, labels, lengths, shape[:2])
     follows = _transitions(demos, n_subtasks)
-    return StepCounts(occurs, before * both, both, follows, np.ones(shape[1:]))
+    return StepCounts(occurs, before * both, both, follows)
 
 
 def _precedence(

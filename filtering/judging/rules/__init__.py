@@ -1,0 +1,1 @@
+"""What a user knows about a task: rules of order, legal orders, optional and critical steps."""
