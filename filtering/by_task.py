@@ -58,7 +58,7 @@ def fit_by_task(config: FilterConfig, pool: Source, *, workers: Workers = IN_PRO
         for rows in judged.values()
     ]
     joined = _joined(config, pool, judged, fits)
-    joined.notes_ += tuple(
+    joined.words_ += tuple(
         f"Too few demonstrations to judge, so that all are kept: {len(rows)} of the task '{task}'."
         for task, rows in tasks.items()
         if task not in judged
@@ -88,15 +88,15 @@ def _joined(
     whole.reasons_, whole.findings_ = tuple(spread("reasons_", "")), tuple(spread("findings_", ()))
     whole.group_names_, whole.groups_ = _groups(fits, places, count)
     whole.chosen_, whole.cameras_ = fits[0].chosen_, fits[0].cameras_
-    whole.decision_, whole.objective_ = None, None
+    whole.decision_, whole.objective_, whole.summary_ = None, None, None
     whole.threshold_ = max(fit.threshold_ for fit in fits)
     whole.segments_ = _segments(judged, fits, count)
     looked_at = {camera for fit in fits for camera in fit.looked_at_}
     whole.looked_at_ = tuple(camera for camera in pool.cameras if camera in looked_at)
-    whole.notes_ = tuple(
-        f"Task '{task}': {note}"
+    whole.words_ = tuple(
+        f"Task '{task}': {words}"
         for task, fit in zip(judged, fits, strict=True)
-        for note in fit.notes_
+        for words in fit.words_
     )
     stages = dict.fromkeys(stage for fit in fits for stage in fit.timings_)
     whole.timings_ = {s: sum(fit.timings_.get(s, 0.0) for fit in fits) for s in stages}

@@ -169,8 +169,6 @@ def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
         if row.reason:
             print(f"{names[row.demo_id]}  weight {row.weight:.2f}  {row.reason}")
     print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
-    for note in fitted.notes_:
-        print(note)
     for words in fitted.words_:
         print(words)
 

@@ -105,7 +105,6 @@ from the whole video.
         cameras_: cameras used for segments and states; effects use all cameras of the pool unless
             some are named.
         looked_at_: cameras whose pictures were looked at.
-        notes_: sentences on what about this pool changed how it was judged.
         timings_: seconds per stage.
     """
 
@@ -127,7 +126,6 @@ from the whole video.
     chosen_: FilterConfig
     cameras_: tuple[str, ...]
     looked_at_: tuple[str, ...]
-    notes_: tuple[str, ...]
     timings_: dict[str, float]
 
     def __init__(self, config: FilterConfig | None = None) -> None:
@@ -146,10 +144,11 @@ from the whole video.
                 although a setting needs them.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
-        self.timings_, self.notes_ = {}, ()
+        self.timings_, self._notes = {}, tuple[str, ...]()
         self._check(pool)
         require_sound(pool)
         self.chosen_ = self.config.for_source(pool)
+        self._knows_steps = self.chosen_.score != MOMENTS
         self.cameras_ = self._cameras(pool)
         judges = {MOMENTS: self._by_moments, COMBINED: self._by_both}
         judge = judges.get(self.chosen_.score, self._by_segments)
@@ -203,21 +202,22 @@ from the whole video.
 
     def _by_both(self, pool: Source, workers: Workers) -> Judgement:
         """Judge by sub-tasks and by moments; the graver verdict counts."""
-        from filtering.judging.combined import combine, doubts
+        from filtering.judging.combined import CONFIRMED, combine, doubts
         from filtering.moments.confirmed import confirmation
         from filtering.moments.suitable import FEWEST_MOMENTS
 
         by_segments = self._by_segments(pool, workers)
         if self._shortest(pool) < FEWEST_MOMENTS:
-            self.notes_ = (TOO_SHORT,)
+            self._notes = (TOO_SHORT,)
             return self._cut(by_segments)
         by_moments, score = self._moments(pool, workers)
         found = list(score.counterparts.values())
         lengths = [episode.length for episode in pool.episodes]
         labels = labels_at(self.segments_, lengths, found[0].lengths)
         confirmed = max(confirmation(one, labels) for one in found)
-        self.notes_ = doubts(confirmed, score.one_order)
-        norm = None if self.notes_ else by_segments
+        self._notes = doubts(confirmed, score.one_order)
+        self._knows_steps = confirmed >= CONFIRMED
+        norm = None if self._notes else by_segments
         return self._cut(combine(norm, by_moments, pool.fps, self.config.groups))
 
     @staticmethod
@@ -357,11 +357,12 @@ from the whole video.
     def _sum_up(self) -> None:
         """Say what holds for the pool as a whole."""
         self.summary_ = None
-        if self.chosen_.score != MOMENTS:
+        if self._knows_steps:
             self.summary_ = summarise(self.segments_, self.weights_, self.flagged_, self.config)
         decided = [f"{words}." for words in self.decision_.words] if self.decision_ else []
         warning = caution(len(self.weights_))
         self.words_ = (
+            *self._notes,
             *decided,
             *(self.summary_.words if self.summary_ else ()),
             *([warning] if warning else []),

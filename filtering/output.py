@@ -146,7 +146,6 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "subtasks": list(fitted.segments_.subtasks),
         "segmentation": _segmentation_record(fitted, pool),
         "segmentation_confidence": fitted.segments_.confidence(),
-        "notes": list(fitted.notes_),
         "demonstrations": len(fitted.weights_),
         "caution": caution(len(fitted.weights_)),
         "flagged": int(fitted.flagged_.sum()),

@@ -51,15 +51,14 @@ def test_each_task_gets_what_it_gets_alone(pool):
 def test_a_task_of_few_demonstrations_is_kept_with_a_note(pool):
     fitted = fit_by_task(CONFIG, told(pool, ["tea"] * 12 + ["other"] * 2))
     assert fitted.weights_[12:].tolist() == [1.0, 1.0]
-    assert fitted.notes_ == (
-        "Too few demonstrations to judge, so that all are kept: 2 of the task 'other'.",
+    assert fitted.words_[-1] == (
+        "Too few demonstrations to judge, so that all are kept: 2 of the task 'other'."
     )
 
 
 def test_descriptions_in_words_of_their_own_are_no_tasks(pool):
     fitted = fit_by_task(CONFIG, told(pool, map(str, range(14))))
     assert fitted.flagged_.sum() == 2
-    assert not fitted.notes_
 
 
 def test_one_task_is_judged_as_it_is(pool):
