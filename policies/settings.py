@@ -102,7 +102,12 @@ class TrainSettings:
     level: str = "subtask"
     """What the policy chooses: subtask (the next sub-task) or joint (the joint targets)."""
     weights: Path | None = None
-    """Weight table (weights.csv of `teasim filter`)."""
+    """Weight table (weights.csv of `teasim filter`), or the output folder of the filter: where the
+    pool logs no sub-tasks, those that the filter found are decided on, step 1, step 2, ..."""
+    segments: Path | None = None
+    """Table of sub-tasks (segments.csv of `teasim filter`) to decide on in place of logged ones."""
+    names: Path | None = None
+    """File with names for the sub-tasks of the table, as for `teasim label`."""
     use: str | None = None
     """How the table is used: discard (leave out flagged demonstrations), weight, or ignore;
     default: discard if there is a table."""

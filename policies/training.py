@@ -10,6 +10,7 @@ from typing import Any
 
 from policies.checkpoint import AnyPolicy, save_policy
 from policies.data.demos import DemosConfig, load_decisions
+from policies.data.found import weight_table, with_found_subtasks
 from policies.data.motions import MotionSamples, check_log, load_motions
 from policies.data.samples import DecisionSamples
 from policies.data.weighting import demo_weights, likely_experts
@@ -99,7 +100,8 @@ def train(settings: TrainSettings) -> Training:
     pool = Pool.open(settings.pool)
     require_sound(pool)
     print_notes(pool)
-    weights = demo_weights(pool, settings.weights, settings.chosen_use)
+    weights = demo_weights(pool, weight_table(settings.weights), settings.chosen_use)
+    pool = with_found_subtasks(pool, settings.segments, settings.weights, settings.names)
     options |= provide(kind, pool, settings)
     check_new_folder(settings.out)
     began = time.perf_counter()
@@ -151,12 +153,13 @@ def provide(kind: LearnerKind, pool: Pool, settings: TrainSettings) -> dict[str,
 def _experts(pool: Pool, settings: TrainSettings) -> tuple[int, ...]:
     if settings.expert:
         return places_of(pool, settings.expert)
-    if settings.weights is None:
+    table = weight_table(settings.weights)
+    if table is None:
         raise ConfigError(
             f"The learner '{settings.learner}' needs demonstrations known to be good; name their "
             "episodes with --expert, or give a weight table with --weights."
         )
-    return likely_experts(pool, settings.weights)
+    return likely_experts(pool, table)
 
 
 def places_of(pool: Pool, episodes: tuple[int, ...]) -> tuple[int, ...]:

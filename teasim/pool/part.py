@@ -32,4 +32,6 @@ class Part:
 
     def __getattr__(self, name: str) -> Any:
         """Answer like the whole."""
+        if name.startswith("_"):  # asked for while it is unpickled
+            raise AttributeError(name)
         return getattr(self._whole, name)
