@@ -157,6 +157,7 @@ def test_the_filter_looks_with_it_and_the_cache_tells_weights_apart(
     assert found.weights_.sum() == pytest.approx(3.5)
 
 
+@pytest.mark.slow
 def test_features_are_learned_from_its_maps_and_remember_it(
     weights: Path, toy_pool: Pool, tmp_path: Path
 ) -> None:

@@ -3,7 +3,7 @@
 from itertools import permutations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from teasim.pool.ways.ways import difference, find_ways, inversions
@@ -17,6 +17,7 @@ NO_WATER = ("on", "bag", "sugar", "milk", "off", "stir")
 STEPS = st.lists(st.sampled_from("abcde"), max_size=6)
 
 
+@settings(deadline=None)
 @given(st.lists(STEPS, min_size=1, max_size=8))
 def test_every_demonstration_is_in_one_way_and_in_one_order(demos: list[list[str]]) -> None:
     ways = find_ways(demos)
@@ -28,6 +29,7 @@ def test_every_demonstration_is_in_one_way_and_in_one_order(demos: list[list[str
     assert find_ways(demos[::-1]).all[0].steps == ways.all[0].steps
 
 
+@settings(deadline=None)
 @given(STEPS, STEPS)
 def test_a_difference_is_empty_exactly_if_both_are_equal(one: list[str], other: list[str]) -> None:
     first, second = (find_ways([steps]).demos[0] for steps in (one, other))
