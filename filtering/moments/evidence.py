@@ -71,16 +71,25 @@ class Evidence:
     """Per demonstration where in another video that which it is about is seen."""
 
 
-def missing_order_extra(
-    found: Counterparts, trusted: Trusted
-) -> tuple[Evidence, Evidence, Evidence]:
-    """Return the evidence of the three kinds, in the order of the name.
+def references_of(found: Counterparts, trusted: Trusted) -> "list[Reference]":
+    """Return what is usual, seen from each trusted reference.
 
     Args:
         found: the counterparts.
         trusted: (D,) True for the demonstrations that say what is usual.
     """
-    references = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
+    return [Reference(found, row, trusted) for row in rows_of(found, trusted)]
+
+
+def missing_order_extra(
+    found: Counterparts, references: "Sequence[Reference]"
+) -> tuple[Evidence, Evidence, Evidence]:
+    """Return the evidence of the three kinds, in the order of the name.
+
+    Args:
+        found: the counterparts.
+        references: what is usual.
+    """
     results = [
         _Comparison([r for r in references if r.number != d], d) for d in range(len(found.lengths))
     ]
@@ -91,9 +100,8 @@ def missing_order_extra(
     )
 
 
-def moves_between(found: Counterparts, trusted: Trusted) -> Array:
+def moves_between(references: "Sequence[Reference]") -> Array:
     """Return (P,): per pair of trusted demonstrations how far steps move [length of a video]."""
-    references = [_Reference(found, row, trusted) for row in rows_of(found, trusted)]
     return np.array([far for reference in references for far in reference.moves()])
 
 
@@ -158,10 +166,11 @@ def peak(curve: NDArray[np.floating]) -> tuple[int, int]:
     return start, stop
 
 
-class _Reference:
+class Reference:
     """What is usual among the trusted at each moment of one reference."""
 
     def __init__(self, found: Counterparts, row: int, trusted: Trusted) -> None:
+        """Compare the trusted demonstrations with the reference of a row of `found`."""
         self.number = found.references[row]
         self._matches, self._back = found.there[row], found.back[row]
         others = [found.references[other] for other in rows_of(found, trusted)]
@@ -170,6 +179,7 @@ class _Reference:
         self._nears = np.stack([np.log(m.near + TINY) for m in matches if m is not None])
         self.usual: Array = np.median(self._nears, axis=0)
         self._moved = np.stack([self._moved_in(k) for k in self._others])
+        self._rows = {k: row for row, k in enumerate(self._others)}
 
     def departures(self, d: int) -> tuple[Array, Array]:
         """Return (n,), (n,): how much farther than usual, and how much displaced, d shows it."""
@@ -178,7 +188,8 @@ class _Reference:
         kept = [row for row, k in enumerate(self._others) if k != d] or [0]
         lack = np.log(match.near + TINY) - np.quantile(self._nears[kept], 1 - VARIETY, axis=0)
         usual = np.quantile(self._moved[kept], 1 - VARIETY, axis=0)
-        return lack, np.maximum(self._moved_in(d) - usual, 0.0)
+        own = self._moved[self._rows[d]] if d in self._rows else self._moved_in(d)
+        return lack, np.maximum(own - usual, 0.0)
 
     def _moved_in(self, d: int) -> Array:
         match, back = self._matches[d], self._back[d]
@@ -210,7 +221,7 @@ _Result = tuple[float, Stretch, Stretch]
 class _Comparison:
     """A demonstration compared with all references."""
 
-    def __init__(self, references: Sequence[_Reference], d: int) -> None:
+    def __init__(self, references: Sequence[Reference], d: int) -> None:
         self._references, self._d = references, d
         pairs = [reference.departures(d) for reference in references]
         self._lacks, self._shifts = [lack for lack, _ in pairs], [shift for _, shift in pairs]

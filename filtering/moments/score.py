@@ -22,10 +22,12 @@ from filtering.moments.decision import (
 from filtering.moments.effects import View, ineffective, observe
 from filtering.moments.evidence import (
     Evidence,
+    Reference,
     Stretch,
     Trusted,
     missing_order_extra,
     moves_between,
+    references_of,
     share_of_one_order,
     variety_of,
 )
@@ -154,9 +156,14 @@ def score_moments(cameras: Mapping[str, Sequence[Video]]) -> MomentScore:
         return _judged(useful, views, structure)
 
 
-def gather(found: Counterparts, views: Sequence[View], trusted: Trusted) -> dict[str, Evidence]:
+def gather(
+    found: Counterparts,
+    references: Sequence[Reference],
+    views: Sequence[View],
+    trusted: Trusted,
+) -> dict[str, Evidence]:
     """Return the evidence of every kind that one camera gives, measured by the trusted."""
-    kinds = (*missing_order_extra(found, trusted), ineffective(found, views, trusted))
+    kinds = (*missing_order_extra(found, references), ineffective(found, views, trusted))
     return dict(zip(KINDS, kinds, strict=True))
 
 
@@ -168,21 +175,22 @@ def _judged(
     """Put cameras and kinds together."""
     cameras = list(found)
     evidence: dict[str, dict[str, Evidence]] = {}
+    one_order: dict[str, float] = {}  # known since the first round, which trusts everybody
 
     def values(trusted: Trusted) -> list[Observed]:
-        evidence.update({c: gather(found[c], views[c], trusted) for c in cameras})
-        return [
-            Observed(
-                {kind: evidence[c][kind].values for kind in KINDS},
-                variety_of(moves_between(found[c], trusted)),
-            )
-            for c in cameras
-        ]
+        seen = []
+        for camera in cameras:
+            references = references_of(found[camera], trusted)
+            evidence[camera] = gather(found[camera], references, views[camera], trusted)
+            moves = moves_between(references)
+            if trusted.all():
+                one_order[camera] = share_of_one_order(moves)
+            by_kind = {kind: evidence[camera][kind].values for kind in KINDS}
+            seen.append(Observed(by_kind, variety_of(moves)))
+        return seen
 
     count = len(next(iter(found.values())).lengths)
     _, each = judge(values, count)
-    everybody = np.ones(count, dtype=np.bool_)
-    one_order = [share_of_one_order(moves_between(found[c], everybody)) for c in cameras]
     exceeded = most_telling(each)
     chosen = {kind: telling([one[kind] for one in each]) for kind in KINDS}
     findings = []
@@ -199,7 +207,7 @@ def _judged(
         tuple(findings),
         found,
         structure,
-        one_order=float(np.median(one_order)),
+        one_order=float(np.median(list(one_order.values()))),
     )
 
 
