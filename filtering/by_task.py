@@ -11,9 +11,9 @@ from filtering.demo_filter import FEWEST_DEMOS, DemoFilter
 from filtering.segmentation.segments import Segmentation
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
-from teasim.pool.part import Part
 from teasim.pool.soundness import require_sound
 from teasim.pool.source import Source
+from teasim.pool.views.part import Part
 
 USUAL = {
     "weights_": 1.0,

@@ -23,7 +23,7 @@ from teasim.common.statistics import auroc
 from teasim.common.workers import Workers
 from teasim.pool import Pool
 from teasim.pool.lerobot import Episode
-from teasim.pool.part import Part
+from teasim.pool.views.part import Part
 
 GOOD, CLEAN = 10, 12
 """Usual videos of a pool with mistakes, and videos of a pool without."""

@@ -9,8 +9,8 @@ from typing import cast
 
 from teasim.common.errors import ConfigError
 from teasim.pool import Pool
-from teasim.pool.segmented import Segmented
 from teasim.pool.segments_table import read_segments_table
+from teasim.pool.views.segmented import Segmented
 from teasim.pool.writers.subtask_names import check_names, read_names
 
 SEGMENTS, WEIGHTS = "segments.csv", "weights.csv"

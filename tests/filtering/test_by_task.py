@@ -6,8 +6,8 @@ import pytest
 from filtering import DemoFilter, FilterConfig
 from filtering.by_task import fit_by_task, tasks_of
 from teasim.pool.mstcn.folder import write_predictions
-from teasim.pool.part import Part
 from teasim.pool.readers.registry import open_source
+from teasim.pool.views.part import Part
 
 USUAL, SHORT = np.repeat([0, 1, 2], 5), np.repeat([0, 2], 5)
 CONFIG = FilterConfig(segmenter="predictions")

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from teasim.common.errors import PoolError
-from teasim.pool.part import Part
 from teasim.pool.segments_table import SegmentRow, spans_by_demonstration
 from teasim.pool.source import Demonstration, Source
 from teasim.pool.types import Span
+from teasim.pool.views.part import Part
 
 
 class SegmentedDemonstration:

@@ -1,0 +1,1 @@
+"""Sources that show a part of another source, or show it otherwise."""
