@@ -8,11 +8,12 @@ import pytest
 from policies.cli import reproduce
 from policies.experiments.reproduce import plan as plans
 from policies.experiments.reproduce import run
-from policies.experiments.reproduce.exhibit import as_csv, as_html, as_markdown
+from policies.experiments.reproduce.exhibit import as_html, as_markdown
 from policies.experiments.reproduce.paper import DETECTION, precision_sentence
 from policies.experiments.reproduce.plan import SIZES
 from policies.experiments.reproduce.registry import EXHIBITS
 from policies.experiments.reproduce.works import WORKS
+from policies.experiments.tabular import csv_text
 from policies.experiments.units import Store, do_units, missing
 from teasim.common.errors import ConfigError
 from teasim.common.workers import IN_PROCESS
@@ -70,7 +71,7 @@ def test_every_exhibit_has_rows_sentences_and_files(store, name):
         return
     assert table.words
     assert all(list(row) == table.columns for row in table.rows)
-    rows = list(csv.DictReader(as_csv(table).splitlines()))
+    rows = list(csv.DictReader(csv_text(table.rows).splitlines()))
     assert len(rows) == len(table.rows)
     assert text.count("\n| ") == len(rows) + 2
 

@@ -4,23 +4,16 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from policies.experiments.reproduce.exhibit import Exhibit, Table, as_csv, as_html, as_markdown
+from policies.experiments.reproduce.exhibit import Exhibit, Table, as_html, as_markdown
 from policies.experiments.reproduce.plan import Plan
 from policies.experiments.reproduce.registry import ALL, EXHIBITS
 from policies.experiments.reproduce.works import WORKS
+from policies.experiments.tabular import html_page, write_rows
 from policies.experiments.units import Store, Unit, do_units, missing
 from policies.settings import ReproduceSettings
 from teasim.common.errors import ConfigError
 from teasim.common.files import write_text
 from teasim.common.registry import named
-
-STYLE = (
-    "body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em}"
-    "table{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}"
-    "th,td{border:1px solid #ccc;padding:2px 8px;text-align:left}"
-    "pre{background:#f4f4f4;padding:.5em;overflow-x:auto}"
-)
-"""CSS of the page."""
 
 
 def run_reproduction(settings: ReproduceSettings) -> str:
@@ -88,19 +81,16 @@ def cost(units: Sequence[Unit], store: Store, jobs: int) -> str:
 def write_pages(
     out: Path, chosen: Mapping[str, Exhibit], tables: Mapping[str, Table], command: str
 ) -> None:
-    """Write NAME.csv and NAME.md for every exhibit, and index.html over them."""
+    """Write NAME.csv, NAME.parquet and NAME.md for every exhibit, and index.html over them."""
     sections = []
     for name, exhibit in chosen.items():
         table = tables[name]
         write_text(out / f"{name}.md", as_markdown(name, exhibit, table, command))
         if not table.not_run:
-            write_text(out / f"{name}.csv", as_csv(table))
+            write_rows(out, name, table.rows)
         sections.append(as_html(name, exhibit, table, command))
-    head = (
-        "<!doctype html><html lang='en'><meta charset='utf-8'><title>Reproduction</title>"
-        f"<style>{STYLE}</style><h1>Tables and figures of Hussein &amp; Begum (CoRL 2022)</h1>"
-    )
-    write_text(out / "index.html", "\n".join([head, *sections, "</html>\n"]))
+    title = "Tables and figures of Hussein & Begum (CoRL 2022)"
+    write_text(out / "index.html", html_page(title, sections))
 
 
 def summary(tables: Mapping[str, Table], out: Path) -> str:
