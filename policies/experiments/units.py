@@ -95,11 +95,16 @@ class Store:
             "spec": unit.spec,
             "needs": {name: needed.name for name, needed in unit.needs.items()},
             "command": self.command,
-            "versions": {name: version(name) for name in RECORDED},
+            "versions": versions(),
             "seconds": round(seconds, 3),
             "result": result,
         }
         write_json(self.path(unit), record)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the packages that results depend on."""
+    return {name: version(name) for name in RECORDED}
 
 
 def missing(units: Iterable[Unit], store: Store) -> list[Unit]:
