@@ -1,12 +1,18 @@
 """Stand-ins for the slow work of a reproduction: results of the right form within a millisecond."""
 
-from dataclasses import asdict
+from functools import lru_cache
 
 import numpy as np
 
 from filtering.judging.evidence import Evidence
 from filtering.segmentation.metrics import TOLERANCES
-from policies.experiments.reproduce.methods import Question, judge_all
+from policies.experiments.reproduce.exhibits.salads import judge_salads
+from policies.experiments.reproduce.methods import (
+    Question,
+    judge_all,
+    judge_thresholds,
+    weigh_all,
+)
 from policies.experiments.reproduce.plan import Plan, Size
 from teasim.pool import Span
 from tests.toy_pool import SEQ_1, SEQ_2
@@ -21,6 +27,7 @@ TINY = Size(
     ladder=(1,),
     pools=2,
     clustered=1,
+    unlabelled=(1,),
     frames=1,
     incorrect=(2,),
     episodes=1,
@@ -55,12 +62,31 @@ def fake_segmentation(unit, store, workers):
 
 
 def fake_detection(unit, store, workers):
-    kinds, known = unit.spec["kinds"], evidence(unit.spec["kinds"])
-    wrong = np.repeat([place > 0 for place in range(len(kinds))], [count for _, count in kinds])
-    names = tuple(f"demo{place}" for place in range(len(wrong)))
-    said = judge_all(Question(known, wrong), names)
-    one = {name: asdict(judged) for name, judged in said.items()}
-    return {"pools": [one] * unit.spec["pools"]}
+    said = judged(unit.kind, tuple((kind, count) for kind, count in unit.spec["kinds"]))
+    return {"pools": [said] * unit.spec["pools"]}
+
+
+@lru_cache  # SLSQP takes a second
+def judged(work, kinds):
+    judge = {"detection": judge_all, "thresholds": judge_thresholds, "weights": weigh_all}
+    places = np.repeat(range(len(kinds)), [count for _, count in kinds])
+    names = tuple(f"demo{place}" for place in range(len(places)))
+    return judge[work](Question(evidence(kinds), places, names))
+
+
+def fake_policies(unit, store, workers):
+    spread = {"policy_accuracy": 0.9, "policy_accuracy_low": 0.8, "policy_accuracy_high": 0.95}
+    change = {"difference": 0.1, "difference_low": 0.05, "difference_high": 0.2}
+    results = [
+        {"learner": learner, "filter": name, "mode": mode, "seed": 0, "episodes": 1, "success": 1.0}
+        | spread
+        | change
+        for learner in unit.spec["learners"]
+        for name in ("all", "filtered", "oracle")
+        for mode in ("deterministic", "sampled")
+    ]
+    detection = [{"filter": "filtered", "recall": 1.0, "false_alarms": 0.1}]
+    return {"results": results, "detection": detection}
 
 
 FAKES = {
@@ -68,6 +94,10 @@ FAKES = {
     "network": fake_bank,
     "segmentation": fake_segmentation,
     "detection": fake_detection,
+    "thresholds": fake_detection,
+    "weights": fake_detection,
+    "salads": judge_salads,
+    "policies": fake_policies,
 }
 
 

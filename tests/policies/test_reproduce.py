@@ -8,7 +8,7 @@ import pytest
 from policies.cli import reproduce
 from policies.experiments.reproduce import plan as plans
 from policies.experiments.reproduce import run
-from policies.experiments.reproduce.exhibit import as_html, as_markdown
+from policies.experiments.reproduce.exhibits.exhibit import as_html, as_markdown
 from policies.experiments.reproduce.paper import DETECTION, precision_sentence
 from policies.experiments.reproduce.plan import SIZES
 from policies.experiments.reproduce.registry import EXHIBITS
@@ -43,6 +43,7 @@ def test_every_exhibit_says_what_it_and_the_paper_show(name):
 def test_every_kind_of_work_is_known(name, size):
     plan = plans.Plan.sized(size)
     units = missing(EXHIBITS[name].units(plan), Store(plans.Path("nowhere")))
+    assert units or name == "table4"
     assert {unit.kind for unit in units} <= set(WORKS)
     assert all(unit.seconds >= 0 for unit in units)
     json.dumps([unit.spec for unit in units])
@@ -124,7 +125,7 @@ def test_the_verb_writes_a_page_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(run, "WORKS", {})  # nothing is left to do
     assert reproduce(words) == 0
     assert (out / "table2.csv").read_bytes() == first
-    assert capsys.readouterr().err.startswith("20 of 20 units of work are done.")
+    assert capsys.readouterr().err.startswith("16 of 16 units of work are done.")
 
 
 def refused(*words):

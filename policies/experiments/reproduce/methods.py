@@ -1,8 +1,9 @@
 """The ways to judge a pool that are compared: ours, the paper's, and baselines."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,14 @@ from filtering.judging.judges import by_norm
 from filtering.judging.thresholds import group_weights, probability_incorrect
 from policies.experiments.detection import Judged, told_how_many
 
+OURS = "norm"
+"""The method that is compared with the paper's numbers."""
+LEARNED = "norm, learned decision"
+"""The same score with the learned decision."""
+THRESHOLDS = ("kmeans", "gmm", "minibatch")
+"""Clusterings of the weights (the paper, section 3.3 and appendix E)."""
+SOLVERS = ("published", "annealed")
+"""Solvers of equation 3 whose weights are shown."""
 TRUSTED = 0.5
 """M / D of equation 3, as in the paper."""
 
@@ -28,10 +37,17 @@ class Question:
 
     evidence: Evidence
     """What is seen."""
-    wrong: NDArray[np.bool_]
-    """(D,) which demonstrations are incorrect."""
+    kinds: NDArray[np.int64]
+    """(D,) kind of each demonstration, 0 is correct."""
+    names: tuple[str, ...]
+    """(D,) identity of each demonstration."""
     seed: int = 0
     """Seed of random answers."""
+
+    @property
+    def wrong(self) -> NDArray[np.bool_]:
+        """(D,) which demonstrations are incorrect."""
+        return self.kinds > 0
 
 
 @dataclass(frozen=True)
@@ -66,8 +82,7 @@ def learned(question: Question) -> Answer:
 
 def equation_3(question: Question) -> Answer:
     """Judge as the paper does: w of equation 3 by SLSQP, two groups by k-means (section 3.3)."""
-    weights = paper_weights(question.evidence)
-    return Answer(group_weights(weights, "2", "kmeans").flagged, -weights)
+    return by_threshold(paper_weights(question.evidence), "kmeans")
 
 
 def paper_weights(evidence: Evidence, solver: str = "published") -> NDArray[np.float64]:
@@ -97,8 +112,8 @@ def oracle(question: Question) -> Answer:
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        "norm": norm,
-        "norm, learned decision": learned,
+        OURS: norm,
+        LEARNED: learned,
         "equation 3": equation_3,
         "length": length,
         "random": chance,
@@ -106,23 +121,55 @@ METHODS: Mapping[str, Method] = MappingProxyType(
     }
 )
 """Every method by its name in the tables."""
-OURS = "norm"
-"""The method that is compared with the paper's numbers."""
 
 
-def judge_all(question: Question, names: tuple[str, ...]) -> dict[str, Judged]:
-    """Return what every method says about a pool; demonstrations are `names` (D,)."""
-    wrong = tuple(map(bool, question.wrong))
+def judge_all(question: Question) -> dict[str, Any]:
+    """Return what every method says about a pool, as JSON can hold it."""
     # The matrices are small: several BLAS threads would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
         answers = {name: method(question) for name, method in METHODS.items()}
-    return {
-        name: Judged(
-            names,
-            wrong,
-            tuple(map(bool, said.flagged)),
-            tuple(map(float, said.losses)),
-            None if said.probabilities is None else tuple(map(float, said.probabilities)),
-        )
-        for name, said in answers.items()
+    return {name: as_judged(question, said) for name, said in answers.items()}
+
+
+def judge_thresholds(question: Question) -> dict[str, Any]:
+    """Return what each clustering of the weights of equation 3 says, and what the scores do."""
+    with threadpool_limits(limits=1, user_api="blas"):
+        weights = paper_weights(question.evidence)
+        answers = {f"equation 3, {name}": by_threshold(weights, name) for name in THRESHOLDS}
+        answers |= {name: METHODS[name](question) for name in (OURS, LEARNED)}
+    return {name: as_judged(question, said) for name, said in answers.items()}
+
+
+def weigh_all(question: Question) -> dict[str, Any]:
+    """Return the weights of a pool by every solver and score, and the groups made of them.
+
+    Every method is told the number of groups, as the paper's is.
+    """
+    told = str(int(question.kinds.max()) + 1)
+    with threadpool_limits(limits=1, user_api="blas"):
+        weights = {f"equation 3, {s}": paper_weights(question.evidence, s) for s in SOLVERS}
+        grouped = {name: (w, group_weights(w, told).groups) for name, w in weights.items()}
+        found = by_norm(question.evidence, JudgingConfig(groups=told))
+        grouped[OURS] = (found.weights, found.grouping.groups)
+    said = {
+        name: {"weights": w.tolist(), "groups": groups.tolist()}
+        for name, (w, groups) in grouped.items()
     }
+    return {"names": list(question.names), "kinds": question.kinds.tolist(), "methods": said}
+
+
+def by_threshold(weights: NDArray[np.float64], threshold: str) -> Answer:
+    """Cut weights (D,) into two groups."""
+    return Answer(group_weights(weights, "2", threshold).flagged, -weights)
+
+
+def as_judged(question: Question, said: Answer) -> dict[str, Any]:
+    """Return an answer beside the truth, as JSON can hold it."""
+    judged = Judged(
+        question.names,
+        tuple(map(bool, question.wrong)),
+        tuple(map(bool, said.flagged)),
+        tuple(map(float, said.losses)),
+        None if said.probabilities is None else tuple(map(float, said.probabilities)),
+    )
+    return asdict(judged)

@@ -69,6 +69,8 @@ class Size:
     """Random pools per row and fitted segmenter."""
     clustered: int
     """Random pools per row for the segmenter without labels."""
+    unlabelled: tuple[int, ...]
+    """Numbers of incorrect demonstrations for which the segmenter without labels is run."""
     frames: int
     """Frames per segment for the features of equation 3."""
     incorrect: tuple[int, ...]
@@ -91,6 +93,7 @@ SIZES: Mapping[str, Size] = MappingProxyType(
             ladder=(1, 3),
             pools=6,
             clustered=1,
+            unlabelled=(1, 4, 8),
             frames=8,
             incorrect=(2, 8),
             episodes=4,
@@ -106,6 +109,7 @@ SIZES: Mapping[str, Size] = MappingProxyType(
             ladder=(1, 2, 3, 6),
             pools=50,
             clustered=10,
+            unlabelled=(1, 2, 4, 6, 8),
             frames=64,
             incorrect=(1, 2, 4, 6, 8),
             episodes=50,

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from policies.experiments.reproduce.exhibit import Exhibit, Table, as_html, as_markdown
+from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table, as_html, as_markdown
 from policies.experiments.reproduce.plan import Plan
 from policies.experiments.reproduce.registry import ALL, EXHIBITS
 from policies.experiments.reproduce.works import WORKS

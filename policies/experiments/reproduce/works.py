@@ -1,8 +1,8 @@
 """The work of every kind of unit: film a bank, fit a network, score it, judge drawn pools."""
 
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -19,7 +19,14 @@ from filtering.segmentation.metrics import (
 from filtering.segmentation.mstcn.checkpoint import load_segmenter
 from filtering.segmentation.scoring import label_pair
 from policies.experiments.generating import generate_pool
-from policies.experiments.reproduce.methods import Question, judge_all
+from policies.experiments.reproduce.exhibits.policies import run_policies
+from policies.experiments.reproduce.exhibits.salads import judge_salads
+from policies.experiments.reproduce.methods import (
+    Question,
+    judge_all,
+    judge_thresholds,
+    weigh_all,
+)
 from policies.experiments.reproduce.readings import Reading, read, read_bank
 from policies.experiments.units import Result, Store, Unit, Work
 from teasim.common.errors import ConfigError
@@ -67,24 +74,29 @@ def score_segments(unit: Unit, store: Store, workers: Workers) -> Result:
     }
 
 
-def judge_pools(unit: Unit, store: Store, workers: Workers) -> Result:
-    """Draw pools from a bank and judge each by every method, from the videos alone.
+def judge_pools(
+    unit: Unit, store: Store, workers: Workers, *, judge: Callable[[Question], Result]
+) -> Result:
+    """Draw pools from a bank and judge each, from the videos alone.
 
     The labels of the bank are read to draw the pools, by the baselines that are told how many
     demonstrations are incorrect, and to score.
+
+    Args:
+        unit: a segmenter or its network, kinds and numbers of demonstrations, number of pools.
+        store: where the bank and the network are.
+        workers: not used, because units run side by side.
+        judge: returns what is said about a pool.
     """
-    del workers  # units run side by side
-    bank, spec = store.folder_of(unit.needs["bank"]), unit.spec
-    pool = Pool.open(bank)
+    del workers
+    spec = unit.spec
+    pool = Pool.open(store.folder_of(unit.needs["bank"]))
     judged = []
     for number, places in enumerate(drawn(pool, spec["kinds"], spec["row"], spec["pools"])):
         reading, own = _reading(unit, store, pool, places)
-        wrong = np.repeat(
-            [kind > 0 for kind in range(len(spec["kinds"]))], [n for _, n in spec["kinds"]]
-        )
+        kinds = np.repeat(range(len(spec["kinds"])), [count for _, count in spec["kinds"]])
         names = tuple(pool.episodes[place].demo_id for place in places)
-        question = Question(reading.evidence(own), wrong, number)
-        judged.append({name: asdict(said) for name, said in judge_all(question, names).items()})
+        judged.append(judge(Question(reading.evidence(own), kinds, names, number)))
     return {"pools": judged}
 
 
@@ -127,6 +139,15 @@ def drawn(
 
 
 WORKS: Mapping[str, Work] = MappingProxyType(
-    {"bank": film, "network": fit, "segmentation": score_segments, "detection": judge_pools}
+    {
+        "bank": film,
+        "network": fit,
+        "segmentation": score_segments,
+        "detection": partial(judge_pools, judge=judge_all),
+        "thresholds": partial(judge_pools, judge=judge_thresholds),
+        "weights": partial(judge_pools, judge=weigh_all),
+        "salads": judge_salads,
+        "policies": run_policies,
+    }
 )
 """The work of every kind of unit."""

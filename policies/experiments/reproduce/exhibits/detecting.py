@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 from policies.experiments.detection import DetectionScores, Judged, detection_scores
-from policies.experiments.reproduce.exhibit import Exhibit, Table
+from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
 from policies.experiments.reproduce.methods import METHODS, OURS
 from policies.experiments.reproduce.paper import (
     CORRECT,
@@ -34,7 +34,9 @@ INTERVALS = (
 """How the rates are to be read."""
 
 
-def pools_unit(plan: Plan, kinds: Sequence[tuple[str, int]], segmenter: str, *, row: int) -> Unit:
+def pools_unit(
+    plan: Plan, kinds: Sequence[tuple[str, int]], segmenter: str, *, row: int, work: str
+) -> Unit:
     """Return the unit that judges pools of some demonstrations of each kind.
 
     Args:
@@ -42,6 +44,7 @@ def pools_unit(plan: Plan, kinds: Sequence[tuple[str, int]], segmenter: str, *, 
         kinds: orders of sub-tasks and numbers of demonstrations; the first kind is correct.
         segmenter: one of SEGMENTERS.
         row: number from which, with the plan's seed, the pools are drawn.
+        work: kind of the unit: detection, thresholds or weights.
     """
     size = plan.size
     pools = size.clustered if segmenter == UNLABELLED else size.pools
@@ -54,7 +57,7 @@ def pools_unit(plan: Plan, kinds: Sequence[tuple[str, int]], segmenter: str, *, 
         "frames": size.frames,
     }
     needs = {"bank": plan.bank("robot"), **plan.segmenter(segmenter)}
-    return Unit("detection", spec, needs, pools * each)
+    return Unit(work, spec, needs, pools * each)
 
 
 def judged_by(unit: Unit, store: Store, method: str) -> list[Judged]:
@@ -105,23 +108,28 @@ def units(plan: Plan, name: str) -> list[Unit]:
     """Return the units of a table, by k and segmenter."""
     return [
         _unit(plan, name, number, segmenter)
-        for number in range(len(DETECTION[name]))
-        for segmenter in SEGMENTERS
+        for number, printed in enumerate(DETECTION[name])
+        for segmenter in segmenters(plan, printed.k)
     ]
+
+
+def segmenters(plan: Plan, k: int) -> list[str]:
+    """Return the segmenters of a row; clustering is slow, and not run for every k in quick."""
+    return [name for name in SEGMENTERS if name != UNLABELLED or k in plan.size.unlabelled]
 
 
 def table(plan: Plan, store: Store, name: str) -> Table:
     """Return all rows of a table: k x segmenter x method."""
     rows, words = [], [precision_sentence()]
     for number, printed in enumerate(DETECTION[name]):
-        for segmenter, words_for_it in SEGMENTERS.items():
+        for segmenter in segmenters(plan, printed.k):
             unit = _unit(plan, name, number, segmenter)
             for method in METHODS:
                 scores = detection_scores(judged_by(unit, store, method))
                 rows.append(
                     {
                         "pool": f"{CORRECT} + {printed.k}",
-                        "segmenter": words_for_it,
+                        "segmenter": SEGMENTERS[segmenter],
                         "method": method,
                         "pools": scores.pools,
                         **score_cells(scores),
@@ -140,7 +148,7 @@ def table(plan: Plan, store: Store, name: str) -> Table:
 def _unit(plan: Plan, name: str, number: int, segmenter: str) -> Unit:
     kinds = [("seq_1", CORRECT), (OTHERS[name], DETECTION[name][number].k)]
     row = 100 * list(OTHERS).index(name) + number
-    return pools_unit(plan, kinds, segmenter, row=row)
+    return pools_unit(plan, kinds, segmenter, row=row, work="detection")
 
 
 def exhibit(name: str, title: str, paper: str) -> Exhibit:

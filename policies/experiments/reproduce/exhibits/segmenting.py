@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from filtering.segmentation.metrics import TOLERANCES
-from policies.experiments.reproduce.detecting import percent
-from policies.experiments.reproduce.exhibit import Exhibit, Table
+from policies.experiments.reproduce.exhibits.detecting import percent
+from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
 from policies.experiments.reproduce.paper import NOT_AVAILABLE, SEGMENTED
 from policies.experiments.reproduce.plan import Plan
 from policies.experiments.units import Store, Unit
