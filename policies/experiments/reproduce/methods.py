@@ -67,14 +67,14 @@ Method = Callable[[Question], Answer]
 
 
 def norm(question: Question) -> Answer:
-    """Judge by the default score and the cut between clusters of its losses."""
+    """Judge by the score norm and the cut between clusters of its losses."""
     found = by_norm(question.evidence, JudgingConfig())
     losses = found.losses
     return Answer(found.grouping.flagged, losses, probability_incorrect(losses))
 
 
 def learned(question: Question) -> Answer:
-    """Judge by the default score with the learned decision."""
+    """Judge by the score norm with the learned decision."""
     found = by_norm(question.evidence, JudgingConfig(decision="learned"))
     assert found.decision is not None
     return Answer(found.grouping.flagged, found.losses, found.decision.probabilities)

@@ -22,7 +22,7 @@ PEOPLE_LEVEL = "people"
 ROBOT_LEVEL = "robot"
 """Segmenter at our level: MS-TCN++ fitted to other videos of the robot."""
 UNLABELLED = "clustering"
-"""Segmenter without labels, the default of `teasim filter`; it is fitted to every pool anew."""
+"""Segmenter without labels; it is fitted to every pool anew."""
 SEGMENTERS: Mapping[str, str] = MappingProxyType(
     {
         PEOPLE_LEVEL: "MS-TCN++ fitted to people",
