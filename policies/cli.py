@@ -1,12 +1,18 @@
-"""The verbs train, evaluate, ablate and demo: options are read here, the work is done elsewhere.
+"""The verbs of policies: options are read here, the work is done elsewhere.
 
 Nothing heavy is imported before the options of a verb are understood.
 """
 
 from collections.abc import Sequence
 
-from policies.settings import AblateSettings, DemoSettings, EvaluateSettings, TrainSettings
-from teasim.common.cli import parse
+from policies.settings import (
+    AblateSettings,
+    DemoSettings,
+    EvaluateSettings,
+    ReproduceSettings,
+    TrainSettings,
+)
+from teasim.common.cli import parse, resumable
 
 EXAMPLES = {
     "train": (
@@ -20,6 +26,10 @@ EXAMPLES = {
     "ablate": (
         "teasim ablate plan.toml -o results",
         "teasim ablate plan.toml -o results --jobs 2",
+    ),
+    "reproduce": (
+        "teasim reproduce all --quick -o reproduced",
+        "teasim reproduce table4 --salads 50salads -o reproduced --dry-run",
     ),
     "demo": (
         "teasim demo -o out",
@@ -52,6 +62,16 @@ def ablate(argv: Sequence[str] | None = None) -> int:
     from policies.experiments.ablation import run_ablation
 
     print(run_ablation(settings))
+    return 0
+
+
+@resumable
+def reproduce(argv: Sequence[str] | None = None) -> int:
+    """Reproduce the tables and figures of the paper."""
+    settings = parse(ReproduceSettings, argv, verb="reproduce", examples=EXAMPLES["reproduce"])
+    from policies.experiments.reproduce.run import run_reproduction
+
+    print(run_reproduction(settings))
     return 0
 
 

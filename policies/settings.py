@@ -1,4 +1,4 @@
-"""Settings of the verbs train, evaluate, ablate and demo, as the command line and Python take them.
+"""Settings of the verbs of policies, as the command line and Python take them.
 
 This module imports nothing heavy: options are understood before torch is loaded.
 """
@@ -140,6 +140,31 @@ class AblateSettings:
     """Folder for the results; an unfinished ablation in it is resumed."""
     workers: WorkerOptions = field(default_factory=Workers)
     """Where the work runs."""
+
+
+@dataclass(frozen=True)
+class ReproduceSettings:
+    """Reproduce the tables and figures of the paper."""
+
+    exhibit: tyro.conf.Positional[str]
+    """What is reproduced: table1 to table4, figure4 to figure6, appendix-e, or all."""
+    out: Out
+    """Folder for the results; an unfinished run in it is resumed."""
+    quick: bool = False
+    """Do less of everything: all in about a quarter of an hour on two idle cores."""
+    dry_run: bool = False
+    """Only say what there is to do and about how long it takes."""
+    salads: Path | None = None
+    """MS-TCN folder of 50-Salads, for table4; without it that table is not run."""
+    seed: int = 0
+    """Seed of everything random."""
+    workers: WorkerOptions = field(default_factory=Workers)
+    """Where the work runs."""
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a negative seed."""
+        if self.seed < 0:
+            raise ConfigError(f"The seed is {self.seed}; choose 0 or more.")
 
 
 @dataclass(frozen=True, kw_only=True)

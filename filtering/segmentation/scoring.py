@@ -39,7 +39,7 @@ def score_episodes(episodes: Sequence[Demonstration], found: Segmentation) -> Sc
     """
     parts: dict[str, list[LabelPair]] = {UNSEEN: [], LABELLED: []}
     for number, episode in enumerate(episodes):
-        pair = _pair(episode, number, found)
+        pair = label_pair(episode, number, found)
         if pair is not None:
             parts[LABELLED if episode.demo_id in found.labelled else UNSEEN].append(pair)
     return {part: segmentation_scores(pairs) for part, pairs in parts.items() if pairs}
@@ -64,7 +64,7 @@ def scores_json(scores: ScoresByPart) -> dict[str, Any]:
     return {part: asdict(s) for part, s in scores.items()}
 
 
-def _pair(episode: Demonstration, number: int, found: Segmentation) -> LabelPair | None:
+def label_pair(episode: Demonstration, number: int, found: Segmentation) -> LabelPair | None:
     """Return true and predicted labels of demonstration `number`; None without logged segments."""
     logged = episode.spans()
     if not logged:

@@ -35,7 +35,7 @@ def demo_weights(pool: Pool, table: Path | None, use: str) -> NDArray[np.float64
         raise ConfigError(f"Use '{use}' needs a weight table; give one with --weights.")
     if table is None:
         return np.ones(len(pool.episodes))
-    rows = _rows_of(pool, table)
+    rows = matched_rows(pool, table)
     weights = np.array([_weight(row, use) for row in rows])
     if not weights.any():
         raise ConfigError(
@@ -54,7 +54,7 @@ def likely_experts(pool: Pool, table: Path) -> tuple[int, ...]:
         ConfigError: the table belongs to another pool.
         PoolError: the table cannot be read.
     """
-    rows = _rows_of(pool, table)
+    rows = matched_rows(pool, table)
     order = sorted(range(len(rows)), key=lambda place: _rank(rows[place]))
     return tuple(sorted(order[: max(1, len(rows) // 4)]))
 
@@ -63,8 +63,13 @@ def _rank(row: WeightRow) -> tuple[bool, float, float]:
     return row.flagged, -row.weight, row.loss
 
 
-def _rows_of(pool: Pool, table: Path) -> list[WeightRow]:
-    """Rows of `table` in the order of the demonstrations of `pool`."""
+def matched_rows(pool: Pool, table: Path) -> list[WeightRow]:
+    """Return the rows of `table` in the order of the demonstrations of `pool`.
+
+    Raises:
+        ConfigError: the table belongs to another pool, or lacks a demonstration.
+        PoolError: the table cannot be read.
+    """
     rows = match_rows(read_weight_table(table), [episode.demo_id for episode in pool.episodes])
     missing = [e for e, row in zip(pool.episodes, rows, strict=True) if row is None]
     if len(missing) == len(pool.episodes):

@@ -1,8 +1,8 @@
 """Ablations: pools x filters x learners x seeds, each combination trained and evaluated.
 
 Each combination is a cell. All policies run in the same episodes, and the scores of a cell are kept
-in a file of its own, so an interrupted ablation can be resumed. The labels of a pool are read for
-the use `labels` alone.
+in a file of its own, so an interrupted ablation can be resumed. The labels of a pool are read to
+score the filters, for the uses `labels`, `random` and `length`, and for `experts`.
 """
 
 import json
@@ -16,26 +16,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.demo_filter import DemoFilter
-from policies.data.demos import DemosConfig, load_decisions
-from policies.data.samples import DecisionSamples
-from policies.data.weighting import demo_weights
+from policies.data.demos import DemosConfig
 from policies.experiments.ablation_config import AblationConfig
-from policies.experiments.ablation_tables import Cell, as_csv, as_markdown
-from policies.experiments.variants import LABELS, FilterVariant, LearnerVariant
+from policies.experiments.ablation_tables import Cell, Detection, Found, write_results
+from policies.experiments.choosing import Chooser
+from policies.experiments.generating import generate_pool
+from policies.experiments.playing import AnyScores, play_cell, scores_from_json, scores_json
+from policies.experiments.units import versions
+from policies.experiments.variants import LearnerVariant, PoolVariant
 from policies.learners.registry import EXPERTS
 from policies.play.environments import World, worlds
-from policies.play.evaluation import MODES, Scores, play, score
-from policies.play.results import as_json
-from policies.play.rollout import Action, Episode
 from policies.settings import AblateSettings, EnvironmentConfig
-from policies.training import places_of
+from policies.training import LEVELS, places_of
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
-from teasim.common.files import check_new_folder, write_json, write_text
+from teasim.common.files import check_new_folder, write_json
 from teasim.common.workers import Workers
 from teasim.pool import Pool
-from teasim.pool.weight_table import write_weight_table
 
 RECORD = "ablation.json"
 """File that says what ablation a folder is for."""
@@ -49,8 +46,8 @@ class Run:
     """The cell."""
     learner: LearnerVariant
     """The learner and its settings."""
-    samples: DecisionSamples
-    """Decisions of the pool."""
+    samples: Any
+    """What its level learns from: decisions or control steps of the pool."""
     weights: NDArray[np.float64]
     """Weight of each demonstration.  # (D,)"""
     experts: tuple[int, ...]
@@ -58,27 +55,60 @@ class Run:
 
 
 def run_ablation(settings: AblateSettings) -> str:
-    """Run what has no scores yet and return the table of results.
+    """Run what has no scores yet and return the tables of results.
 
-    Writes `results.csv` (a row per cell and mode) and `results.md` (training seeds pooled).
+    Writes results (a row per cell and mode) and detection (a row per pool and filter) as CSV and
+    Parquet, and both as tables in results.md and results.html, training seeds pooled.
 
     Raises:
         ConfigError: the configuration is unusable, or the output folder is in use.
         PoolError: a pool is missing or damaged.
     """
-    config, out, workers = AblationConfig.read(settings.config), settings.out, settings.workers
+    return run_plan(AblationConfig.read(settings.config), settings.out, settings.workers)
+
+
+def run_plan(config: AblationConfig, out: Path, workers: Workers) -> str:
+    """Run an ablation; see `run_ablation`."""
     claim(config, out)
     report_resume(config, out)
-    runs = [run for path in config.pools for run in _runs(config, path, out, workers)]
+    pools = [open_pool(variant, out, workers) for variant in config.pools]
+    choosers = [
+        chooser_of(config, pool, variant.name, out, workers)
+        for pool, variant in zip(pools, config.pools, strict=True)
+    ]
+    runs = [run for chooser in choosers for run in _runs(config, chooser)]
     count = min(workers.count, len(runs))
     shares = [runs[first::count] for first in range(count)]
     work = partial(_run_all, config=config, out=out)
     parallel.run(work, shares, workers=workers, description="policies")
+    return write_results(config, results_of(config, choosers, out), out)
+
+
+def results_of(config: AblationConfig, choosers: Sequence[Chooser], out: Path) -> Found:
+    """Read the scores of every cell, and score every filter whose pool has labels."""
     cells = {cell: _read(cell.path(out)) for cell in all_cells(config)}
-    write_text(out / "results.csv", as_csv(cells))
-    table = as_markdown(config, cells)
-    write_text(out / "results.md", table)
-    return table
+    detection: Detection = {}
+    for chooser in choosers:
+        for variant in config.filters:
+            judged = chooser.judged(variant)
+            if judged is not None:
+                detection[chooser.name, variant.name] = judged
+    return Found(cells, detection)
+
+
+def open_pool(variant: PoolVariant, out: Path, workers: Workers) -> Pool:
+    """Open a pool, or make it in the output folder of the ablation."""
+    if variant.folder is not None:
+        return Pool.open(variant.folder)
+    return generate_pool(out / "pools" / variant.name, variant.options, workers)
+
+
+def chooser_of(
+    config: AblationConfig, pool: Pool, name: str, out: Path, workers: Workers
+) -> Chooser:
+    """Return what runs the filters of the configuration on a pool."""
+    filters = {variant.name: variant for variant in config.filters}
+    return Chooser(pool, name, filters, out, config.home, workers)
 
 
 def claim(config: AblationConfig, out: Path) -> None:
@@ -111,55 +141,56 @@ def report_resume(config: AblationConfig, out: Path) -> None:
 
 def all_cells(config: AblationConfig) -> list[Cell]:
     """Every combination, in the order of the configuration."""
-    return [cell for pool in config.pools for cell in _cells_of(config, pool)]
+    return [cell for pool in config.pools for cell in _cells_of(config, pool.name)]
 
 
-def chosen_weights(
-    pool: Pool, variant: FilterVariant, out: Path, workers: Workers
-) -> NDArray[np.float64]:
-    """Weight of every demonstration of `pool`, (D,); a filter is run once and its table kept.
-
-    Raises:
-        ConfigError: nothing is left to learn from, or the pool has no labels for `labels`.
-    """
-    if variant.use == LABELS:
-        return _labels(pool)
-    if not variant.runs:
-        return demo_weights(pool, None, "ignore")
-    table = out / "filters" / f"{pool.root.name}--{variant.name}.csv"
-    if not table.is_file():
-        table.parent.mkdir(exist_ok=True)
-        write_weight_table(table, DemoFilter(variant.config).fit(pool, workers=workers).table())
-    return demo_weights(pool, table, variant.use)
-
-
-def _cells_of(config: AblationConfig, pool: Path) -> list[Cell]:
+def _cells_of(config: AblationConfig, pool: str) -> list[Cell]:
     return [
-        Cell(pool.name, variant.name, learner.name, seed)
+        Cell(pool, variant.name, learner.name, seed)
         for variant in config.filters
         for learner in config.learners
         for seed in config.seeds
     ]
 
 
-def _runs(config: AblationConfig, path: Path, out: Path, workers: Workers) -> list[Run]:
-    """Return the cells of the pool at `path` that have no scores yet."""
-    cells = [cell for cell in _cells_of(config, path) if not cell.path(out).is_file()]
+def _runs(config: AblationConfig, chooser: Chooser) -> list[Run]:
+    """Return the cells of a pool that have no scores yet."""
+    cells = [c for c in _cells_of(config, chooser.name) if not c.path(chooser.out).is_file()]
     if not cells:
         return []
-    pool = Pool.open(path)
-    wanted = {cell.filter for cell in cells}
     weights = {
-        variant.name: chosen_weights(pool, variant, out, workers)
-        for variant in config.filters
-        if variant.name in wanted
+        name: chooser.weights(chooser.filters[name])
+        for name in dict.fromkeys(cell.filter for cell in cells)
     }
-    samples = load_decisions(pool, DemosConfig(observe=config.observe), workers=workers)
-    experts = places_of(pool, config.expert)
     learners = {variant.name: variant for variant in config.learners}
+    wanted = dict.fromkeys(learners[cell.learner].level for cell in cells)
+    demos = DemosConfig(observe=config.observe)
+    samples = {
+        level: LEVELS[level].load(chooser.pool, demos, workers=chooser.workers) for level in wanted
+    }
+    experts = _experts(config, chooser)
     return [
-        Run(cell, learners[cell.learner], samples, weights[cell.filter], experts) for cell in cells
+        Run(
+            cell,
+            learners[cell.learner],
+            samples[learners[cell.learner].level],
+            weights[cell.filter],
+            experts,
+        )
+        for cell in cells
     ]
+
+
+def _experts(config: AblationConfig, chooser: Chooser) -> tuple[int, ...]:
+    if not config.experts:
+        return places_of(chooser.pool, config.expert)
+    good = np.flatnonzero(~chooser.labels())
+    if len(good) < config.experts:
+        raise ConfigError(
+            f"'{chooser.pool.root}' has {len(good)} demonstrations labelled correct, fewer than "
+            f"'experts', {config.experts}."
+        )
+    return tuple(good[: config.experts].tolist())
 
 
 def _run_all(runs: Sequence[Run], *, config: AblationConfig, out: Path) -> None:
@@ -175,38 +206,19 @@ def _run_cell(run: Run, world: World, config: AblationConfig, out: Path) -> None
     needed: dict[str, Any] = {"experts": run.experts} if EXPERTS in kind.needs else {}
     learner = kind.make(seed=cell.seed, **run.learner.settings, **needed)
     policy = learner.fit(run.samples, run.weights).policy_
-    seeds = range(config.first_seed, config.first_seed + config.episodes)
-    played = play(world(policy.spec), policy, seeds)
-    scores = {mode: score(mode, played[mode], policy.action_names) for mode in MODES}
+    played = play_cell(policy, run.learner.level, config, world)
     record = {
         **asdict(cell),
+        "level": run.learner.level,
         "settings": asdict(learner.config),
         "actions": policy.action_names,
         "weights": run.weights.tolist(),
-        "scores": as_json(scores),
+        "versions": versions(),
+        "scores": scores_json(played),
     }
     write_json(cell.path(out), record)
 
 
-def _read(path: Path) -> dict[str, Scores]:
+def _read(path: Path) -> dict[str, AnyScores]:
     """Read the scores of a cell."""
-    record = json.loads(path.read_text())
-    return {
-        mode: score(mode, [_episode(e) for e in found["episodes"]], record["actions"])
-        for mode, found in record["scores"].items()
-    }
-
-
-def _episode(saved: dict[str, Any]) -> Episode:
-    lists = {name: tuple(saved[name]) for name in ("subtasks_done", "violations")}
-    return Episode(**(saved | lists | {"actions": tuple(Action(**a) for a in saved["actions"])}))
-
-
-def _labels(pool: Pool) -> NDArray[np.float64]:
-    records = [episode.record for episode in pool.episodes]
-    if any(record is None for record in records):
-        raise ConfigError(
-            f"'{pool.root}' does not say which demonstrations are correct; "
-            "leave out the filter with use 'labels'."
-        )
-    return np.array([float(record is not None and record.correct) for record in records])
+    return scores_from_json(json.loads(path.read_text()))

@@ -1,6 +1,6 @@
 """The configuration of an ablation, read from a TOML file and checked before any work.
 
-    pools = ["pools/a", "pools/b"]       # folders, relative to this file
+    pools = ["pools/a", "pools/b"]       # folders, relative to this file; or tables, see below
     seeds = [0, 1, 2]                    # of the learners
     observe = "state"
     episodes = 20
@@ -19,6 +19,17 @@
     score = "equation3"
     [filters.labels]                     # without the demonstrations labelled incorrect
     use = "labels"
+    [filters.random]                     # without as many, drawn at random; length: the shortest
+    use = "random"
+    like = "norm"
+    [filters.theirs]                     # somebody else's filter
+    use = "weight"
+    command = "mytool {pool} --out {table}"
+    [filters.stored]                     # a weight table that exists
+    use = "discard"
+    table = "tables/{pool}.csv"
+
+`pools` can also be tables, [pools.NAME] each, with `folder` or with options of `teasim generate`.
 
 The other filters are compared with the first one.
 """
@@ -33,9 +44,11 @@ from policies.data.demos import DemosConfig
 from policies.experiments.variants import (
     FilterVariant,
     LearnerVariant,
+    PoolVariant,
     check_names,
     read_filters,
     read_learners,
+    read_pools,
 )
 from policies.learners.registry import EXPERTS
 from policies.settings import EvaluationConfig
@@ -46,8 +59,8 @@ from teasim.common.errors import ConfigError
 class AblationConfig:
     """Pools x filters x learners x seeds, and how the policies are evaluated."""
 
-    pools: tuple[Path, ...]
-    """Folders of the pools; the last part of a path is the pool's name in the results."""
+    pools: tuple[PoolVariant, ...]
+    """Pools; the last part of a folder is the pool's name in the results."""
     filters: tuple[FilterVariant, ...]
     """Ways to choose demonstrations; the others are compared with the first one."""
     learners: tuple[LearnerVariant, ...] = (LearnerVariant("bc", "bc"),)
@@ -56,6 +69,11 @@ class AblationConfig:
     """Seeds of the learners."""
     expert: tuple[int, ...] = ()
     """Episodes known to be good in every pool, for learners that need experts."""
+    experts: int = 0
+    """In place of `expert`: how many demonstrations of each pool, the first that are labelled
+    correct, are known to be good."""
+    segmenter: str = "auto"
+    """Source of the segments for filters that name none."""
     observe: str = "auto"
     """What the policies see: `auto`, `pixels`, `pixels_agent_pos` or `state`."""
     episodes: int = 20
@@ -66,6 +84,10 @@ class AblationConfig:
     """Actions after which an episode is truncated."""
     env_id: str | None = None
     """Gymnasium id of the environment; None: TeaMakingSubtasks-v0."""
+    joint_env_id: str | None = None
+    """Gymnasium id of the environment for learners of the level joint; None: TeaMaking-v0."""
+    home: Path = Path()
+    """Folder of the configuration, to which its files are relative."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a configuration that cannot be run."""
@@ -75,10 +97,13 @@ class AblationConfig:
         if len(set(names)) < len(names):
             raise ConfigError(f"Two pools have the same name: {', '.join(names)}.")
         needy = [variant.name for variant in self.learners if EXPERTS in variant.kind.needs]
-        if needy and not self.expert:
+        if needy and not (self.expert or self.experts):
             raise ConfigError(
-                f"The learner '{needy[0]}' needs demonstrations known to be good; set 'expert'."
+                f"The learner '{needy[0]}' needs demonstrations known to be good; set 'expert' "
+                "(their episodes) or 'experts' (how many of those labelled correct)."
             )
+        if self.expert and self.experts:
+            raise ConfigError("Both 'expert' and 'experts' were given; choose one.")
         DemosConfig(observe=self.observe)
         EvaluationConfig(self.episodes)
 
@@ -95,27 +120,31 @@ class AblationConfig:
             raise ConfigError(f"The configuration '{path}' cannot be read.") from error
         except tomllib.TOMLDecodeError as error:
             raise ConfigError(f"The configuration '{path}' is not TOML: {error}.") from error
-        check_names(f"The configuration '{path}'", given, cls)
+        check_names(f"The configuration '{path}'", given, cls, without=("home",))
         missing = {"pools", "filters"} - set(given)
         if missing:
             raise ConfigError(f"The configuration '{path}' lacks '{min(missing)}'.")
         values = {name: _typed(name, value) for name, value in given.items() if name not in TABLES}
-        values["pools"] = tuple(path.parent / pool for pool in values["pools"])
+        values["pools"] = read_pools(given["pools"], path.parent)
         if "learners" in given:
             values["learners"] = read_learners(given["learners"])
-        return cls(filters=read_filters(given["filters"]), **values)
+        filters = read_filters(given["filters"], values.get("segmenter", cls.segmenter))
+        return cls(filters=filters, home=path.parent, **values)
 
 
-TABLES = ("filters", "learners")
+TABLES = ("pools", "filters", "learners")
 """Settings that are tables."""
-LISTS: Mapping[str, type] = {"pools": str, "seeds": int, "expert": int}
+LISTS: Mapping[str, type] = {"seeds": int, "expert": int}
 """Settings that are lists, and the type of their items."""
 SINGLES: Mapping[str, type] = {
     "observe": str,
+    "experts": int,
+    "segmenter": str,
     "episodes": int,
     "first_seed": int,
     "max_actions": int,
     "env_id": str,
+    "joint_env_id": str,
 }
 """Settings that are a single value, and its type."""
 

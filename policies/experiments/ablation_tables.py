@@ -1,14 +1,21 @@
-"""Results of an ablation: a CSV row per cell and mode, and Markdown tables of pooled seeds."""
+"""Results of an ablation: rows of cells and of filters, and tables of pooled training seeds."""
 
-import csv
-import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
+from typing import Any
 
 from policies.experiments.ablation_config import AblationConfig
-from policies.play.evaluation import MODES, Scores, score
+from policies.experiments.detection import DetectionScores, Judged, detection_scores
+from policies.experiments.playing import AnyScores, hits_by_scene, main_rate, merged
+from policies.experiments.tabular import html_page, html_table, markdown_table, write_rows
+from policies.play.evaluation import MODES, Scores
+from teasim.common.files import write_text
 from teasim.common.statistics import Rate, bootstrap_difference, rate
+
+ENDS = ("", "_low", "_high")
+"""Ends of the names of the three columns of a rate."""
 
 
 @dataclass(frozen=True)
@@ -29,87 +36,183 @@ class Cell:
         return out / "cells" / f"{self.pool}--{self.filter}--{self.learner}--{self.seed}.json"
 
 
-Cells = Mapping[Cell, Mapping[str, Scores]]
+Cells = Mapping[Cell, Mapping[str, AnyScores]]
 """Scores by mode of every cell."""
+Detection = dict[tuple[str, str], Judged]
+"""What was said by pool and filter, where the pool has labels."""
 
 
-def as_csv(cells: Cells) -> str:
-    """Write one row per cell and mode; rates with their 95 % intervals, in [0, 1].
+@dataclass(frozen=True)
+class Found:
+    """What an ablation found."""
 
-    Each kind of violation has columns of its own, named in the environment's words.
+    cells: Cells
+    """Scores of the policies."""
+    detection: Detection
+    """What the filters said."""
+
+    @property
+    def kinds(self) -> list[str]:
+        """Kinds of violation, in the environments' words."""
+        return list(dict.fromkeys(kind for s in self._scores() for kind in s.violations))
+
+    @property
+    def measure(self) -> str:
+        """Name of what `main_rate` returns for these cells."""
+        over_steps = {isinstance(s, Scores) for s in self._scores()}
+        names = {True: "policy accuracy", False: "sub-tasks done"}
+        return " or ".join(names[kind] for kind in sorted(over_steps, reverse=True))
+
+    def _scores(self) -> Iterator[AnyScores]:
+        return (s for by_mode in self.cells.values() for s in by_mode.values())
+
+    def scores_of(self, pool: str, name: str) -> DetectionScores | None:
+        """Return how well a filter detects in a pool; None where that is not known."""
+        judged = self.detection.get((pool, name))
+        return None if judged is None else detection_scores([judged])
+
+
+def write_results(config: AblationConfig, found: Found, out: Path) -> str:
+    """Write all files and return the text of results.md."""
+    write_rows(out, "results", result_rows(config, found))
+    write_rows(out, "detection", detection_rows(found))
+    tables = tables_of(config, found)
+    text = "\n".join(f"## {title}\n\n{markdown_table(rows)}" for title, rows in tables.items())
+    write_text(out / "results.md", text)
+    parts = [f"<h2>{escape(title)}</h2>{html_table(rows)}" for title, rows in tables.items()]
+    write_text(out / "results.html", html_page("Ablation", parts))
+    return text
+
+
+def result_rows(config: AblationConfig, found: Found) -> list[dict[str, Any]]:
+    """Return a row per cell and mode; rates in [0, 1] with their 95 % intervals.
+
+    Each kind of violation has columns of its own, named in the environment's words. Differences are
+    those to the first filter, in the same episodes and with the same training seed.
     """
-    rows = [(cell, mode, s) for cell, by_mode in cells.items() for mode, s in by_mode.items()]
-    kinds = dict.fromkeys(kind for _, _, s in rows for kind in s.violations)
-    names = ["policy_accuracy", "lenient_accuracy", "success"]
-    names += [kind.replace(" ", "_") for kind in kinds]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    heads = [f"{name}{end}" for name in names for end in ("", "_low", "_high")]
-    writer.writerow(["pool", "filter", "learner", "seed", "mode", "episodes", *heads])
-    for cell, mode, s in rows:
-        found = [s.policy_accuracy, s.lenient_accuracy, s.success]
-        found += [_violation(s, kind) for kind in kinds]
-        numbers = [f"{n:.4f}" for r in found for n in (r.value, r.low, r.high)]
-        key = (cell.pool, cell.filter, cell.learner, cell.seed, mode, len(s.episodes))
-        writer.writerow([*key, *numbers])
-    return text.getvalue()
+    rows = []
+    for key, by_mode in found.cells.items():
+        detected = found.scores_of(key.pool, key.filter)
+        base = found.cells[Cell(key.pool, config.filters[0].name, key.learner, key.seed)]
+        for mode, s in by_mode.items():
+            violated = {kind.replace(" ", "_"): _violation(s, kind) for kind in found.kinds}
+            rates = _rates(s) | violated
+            change = bootstrap_difference(hits_by_scene([s]), hits_by_scene([base[mode]]))
+            rows.append(
+                {
+                    **vars(key),
+                    "mode": mode,
+                    "episodes": len(s.episodes),
+                    **_spread(rates),
+                    "difference": change.value,
+                    "difference_low": change.low,
+                    "difference_high": change.high,
+                    "flagging_recall": detected and detected.recall.value,
+                    "flagging_false_alarms": detected and detected.false_alarms.value,
+                    "flagging_auroc": detected and detected.auroc,
+                    "flagging_brier": detected and detected.brier,
+                }
+            )
+    return rows
 
 
-def as_markdown(config: AblationConfig, cells: Cells) -> str:
-    """Write one table per mode, with the training seeds of a row pooled."""
-    return "\n".join(_table(config, cells, mode) for mode in MODES)
+def detection_rows(found: Found) -> list[dict[str, Any]]:
+    """Return a row per pool and filter; rates in [0, 1] with their 95 % intervals."""
+    rows = []
+    for (pool, name), judged in found.detection.items():
+        s = detection_scores([judged])
+        rates = {name: getattr(s, name) for name in ("recall", "false_alarms", "precision")}
+        rows.append(
+            {
+                "pool": pool,
+                "filter": name,
+                "incorrect": sum(judged.wrong),
+                "correct": len(judged.wrong) - sum(judged.wrong),
+                "flagged": sum(judged.flagged),
+                **_spread(rates | {"accuracy": s.accuracy}),
+                "f1": s.f1,
+                "auroc": s.auroc,
+                "brier": s.brier,
+            }
+        )
+    return rows
 
 
-def _table(config: AblationConfig, cells: Cells, mode: str) -> str:
-    base = config.filters[0].name
-    kinds = list(dict.fromkeys(k for by_mode in cells.values() for k in by_mode[mode].violations))
-    heads = ["pool", "filter", "learner", "policy accuracy", "of each training seed"]
-    heads += ["lenient", "goal reached", *kinds, f"policy accuracy against '{base}'"]
-    lines = [f"## {mode} decisions, {config.episodes} episodes per policy", ""]
-    lines += [_row(heads), _row(["---"] * len(heads))]
+def tables_of(config: AblationConfig, found: Found) -> dict[str, list[dict[str, Any]]]:
+    """Return the tables to read, by title."""
+    tables = {
+        f"{mode} decisions, {config.episodes} episodes per policy": _table(config, found, mode)
+        for mode in MODES
+    }
+    rows = [
+        {
+            "pool": pool,
+            "filter": name,
+            "incorrect found": str(s.recall),
+            "correct ones accused": str(s.false_alarms),
+            "AUROC": s.auroc,
+            "Brier": s.brier,
+        }
+        for (pool, name), judged in found.detection.items()
+        for s in [detection_scores([judged])]
+    ]
+    return tables | {"detection": rows} if rows else tables
+
+
+def _table(config: AblationConfig, found: Found, mode: str) -> list[dict[str, Any]]:
+    rows = []
     for pool in config.pools:
         for learner in config.learners:
-            rows = {
+            by_filter = {
                 variant.name: [
-                    cells[Cell(pool.name, variant.name, learner.name, seed)][mode]
+                    found.cells[Cell(pool.name, variant.name, learner.name, seed)][mode]
                     for seed in config.seeds
                 ]
                 for variant in config.filters
             }
-            lines += [
-                _row([pool.name, name, learner.name, *_numbers(s, kinds), _against(s, rows[base])])
-                for name, s in rows.items()
-            ]
-    return "\n".join([*lines, ""])
+            for name, scores in by_filter.items():
+                keys = {"pool": pool.name, "filter": name, "learner": learner.name}
+                rows.append(keys | _cells(found, scores, by_filter))
+    return rows
 
 
-def _numbers(found: list[Scores], kinds: list[str]) -> list[str]:
-    merged = score(found[0].mode, [e for s in found for e in s.episodes], ())
-    seeds = ", ".join(f"{100 * s.policy_accuracy.value:.1f}" for s in found)
-    violations = (_violation(merged, kind) for kind in kinds)
-    rates = (merged.lenient_accuracy, merged.success, *violations)
-    return [str(merged.policy_accuracy), seeds, *map(str, rates)]
+def _cells(
+    found: Found, scores: list[AnyScores], by_filter: Mapping[str, list[AnyScores]]
+) -> dict[str, Any]:
+    """Return what a row of a table says about the policies of all training seeds."""
+    base, first = next(iter(by_filter.items()))
+    whole = merged(scores)
+    return {
+        found.measure: str(main_rate(whole)),
+        "of each training seed": ", ".join(f"{100 * main_rate(s).value:.1f}" for s in scores),
+        "lenient": str(whole.lenient_accuracy) if isinstance(whole, Scores) else None,
+        "goal reached": str(whole.success),
+        **{kind: str(_violation(whole, kind)) for kind in found.kinds},
+        f"{found.measure} against '{base}'": None
+        if scores is first
+        else str(bootstrap_difference(hits_by_scene(scores), hits_by_scene(first))),
+    }
 
 
-def _violation(scores: Scores, kind: str) -> Rate:
+def _rates(scores: AnyScores) -> dict[str, Rate | None]:
+    over_steps = isinstance(scores, Scores)
+    return {
+        "policy_accuracy": scores.policy_accuracy if isinstance(scores, Scores) else None,
+        "lenient_accuracy": scores.lenient_accuracy if isinstance(scores, Scores) else None,
+        "subtasks_done": None if over_steps else main_rate(scores),
+        "success": scores.success,
+    }
+
+
+def _spread(rates: Mapping[str, Rate | None]) -> dict[str, float | None]:
+    """Return three columns per rate."""
+    columns: dict[str, float | None] = {}
+    for name, r in rates.items():
+        numbers = (r.value, r.low, r.high) if r else (None, None, None)
+        columns |= {f"{name}{end}": n for end, n in zip(ENDS, numbers, strict=True)}
+    return columns
+
+
+def _violation(scores: AnyScores, kind: str) -> Rate:
     """Rate of a kind of violation; 0 where it never occurred and the environment names none."""
     return scores.violations.get(kind) or rate(0, len(scores.episodes))
-
-
-def _against(found: list[Scores], base: list[Scores]) -> str:
-    if found is base:
-        return ""
-    return str(bootstrap_difference(_hits(found), _hits(base)))
-
-
-def _hits(found: list[Scores]) -> list[tuple[int, int]]:
-    """Correct and all actions per scene, over the training seeds: scenes are the pairs."""
-    scenes = zip(*(s.episodes for s in found), strict=True)
-    return [
-        (sum(episode.n_correct for episode in scene), sum(len(e.actions) for e in scene))
-        for scene in scenes
-    ]
-
-
-def _row(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"

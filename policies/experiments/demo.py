@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
-from importlib.metadata import entry_points, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from policies.checkpoint import save_policy
 from policies.data.demos import DemosConfig, load_decisions
 from policies.data.samples import DecisionSamples
 from policies.data.weighting import demo_weights
+from policies.experiments.generating import generate_pool
 from policies.experiments.score_section import score_section, sentences
 from policies.learners.bc_rnn import BCRNN, BCRNNConfig
 from policies.learners.subtask_policy import SubtaskPolicy
@@ -81,7 +82,8 @@ def run_demo(settings: DemoSettings) -> str:
     check_size(settings)
     check_new_folder(settings.out)
     out, workers, watch = settings.out, settings.workers, Stopwatch()
-    pool = generate_pool(out / "pool", settings)
+    counts = {name: getattr(settings, name) for name in ("seq1", "seq3", "seed")}
+    pool = generate_pool(out / "pool", counts, workers)
     watch.lap("generate")
     fitted = DemoFilter(FilterConfig(segmenter=settings.segmenter))
     fitted.fit(pool, workers=workers)
@@ -117,20 +119,6 @@ def check_size(settings: DemoSettings) -> None:
             f"--seq3 {seq3} is not fewer than --seq1 {seq1}, but the filter takes "
             "what most demonstrations do for correct; ask for fewer incorrect ones."
         )
-
-
-def generate_pool(path: Path, settings: DemoSettings) -> Pool:
-    """Generate the pool with the verb `generate`: policies never import the simulator.
-
-    Raises:
-        TeasimError: the verb failed, in its own sentence.
-    """
-    (verb,) = entry_points(group="teasim.verbs", name="generate")
-    given = {name: getattr(settings, name) for name in ("seq1", "seq3", "seed")}
-    given |= asdict(settings.workers)
-    options = [f"--{name}={value}" for name, value in given.items() if value is not None]
-    verb.load()([str(path), *options])
-    return Pool.open(path)
 
 
 def training_sets(pool: Pool, table: Path) -> dict[str, NDArray[np.float64]]:

@@ -28,9 +28,9 @@ def settings(out):
     )
 
 
-def fake_generate(path, config):
-    sequences = [SEQ_1] * config.seq1 + [WITHOUT_TEA_BAG] * config.seq3
-    return make_fake_pool(path, sequences, seed=config.seed)
+def fake_generate(path, options, workers):
+    sequences = [SEQ_1] * options["seq1"] + [WITHOUT_TEA_BAG] * options["seq3"]
+    return make_fake_pool(path, sequences, seed=options["seed"])
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_more_incorrect_demonstrations_than_correct_ones_are_refused(tmp_path):
 def test_a_failed_generation_says_its_own_sentence(tmp_path):
     (tmp_path / "pool").write_text("in the way")
     with pytest.raises(PoolError) as error:
-        demo.generate_pool(tmp_path / "pool", settings(tmp_path))
+        demo.generate_pool(tmp_path / "pool", {"seq1": 3}, IN_PROCESS)
     assert str(error.value) == (
         f"'{tmp_path / 'pool'}' is a file; choose a folder that is new or empty."
     )

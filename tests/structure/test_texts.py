@@ -26,6 +26,7 @@ MARKDOWN = [
     "docs/ci.md",
     "docs/policies.md",
     "docs/data.md",
+    "docs/reproduce.md",
 ]
 SCRIPTS = ["scripts/setup", "scripts/test", "scripts/demo", ".ci/run"]
 TEXTS = {".py", ".md", ".toml", ".xml", ".html", ".j2", ".css", ".js", ".yml", ".yaml", ".lock", ""}

@@ -1,0 +1,62 @@
+"""What a table or figure of the paper becomes here: units of work, then rows and sentences."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from policies.experiments.reproduce.plan import Plan
+from policies.experiments.tabular import Rows, html_table, markdown_table
+from policies.experiments.units import Store, Unit
+
+
+@dataclass(frozen=True)
+class Table:
+    """The data of a table or figure."""
+
+    rows: Rows
+    """The rows; all have the same columns."""
+    words: Sequence[str]
+    """Sentences on what differs from the paper, computed from the rows."""
+    not_run: str = ""
+    """Why nothing was run; empty where something was."""
+    notes: Sequence[str] = ()
+    """How the numbers are to be read."""
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the columns."""
+        return list(self.rows[0]) if self.rows else []
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A table or figure of the paper."""
+
+    title: str
+    """What it shows."""
+    paper: str
+    """What the paper says there, in a sentence."""
+    units: Callable[[Plan], Sequence[Unit]]
+    """Returns the work it is made from."""
+    table: Callable[[Plan, Store], Table]
+    """Returns the table, when all units are done."""
+
+
+def as_markdown(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
+    """Write a section: the command, what the paper says, sentences, and the rows."""
+    parts = [f"## {name}: {exhibit.title}", f"    {command}", f"The paper: {exhibit.paper}"]
+    if table.not_run:
+        return "\n\n".join([*parts, f"Not run: {table.not_run}"]) + "\n"
+    parts += ["\n".join(f"* {sentence}" for sentence in table.words), markdown_table(table.rows)]
+    return "\n\n".join([*parts, *table.notes]) + "\n"
+
+
+def as_html(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
+    """Write the same section as HTML."""
+    head = f"<section id='{escape(name)}'><h2>{escape(name)}: {escape(exhibit.title)}</h2>"
+    parts = [head, f"<pre>{escape(command)}</pre>", f"<p>The paper: {escape(exhibit.paper)}</p>"]
+    if table.not_run:
+        return "\n".join([*parts, f"<p>Not run: {escape(table.not_run)}</p></section>"])
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in table.words)
+    notes = "".join(f"<p>{escape(note)}</p>" for note in table.notes)
+    return "\n".join([*parts, f"<ul>{items}</ul>", html_table(table.rows), notes, "</section>"])
