@@ -201,8 +201,6 @@ def test_real_predictions_are_judged_as_the_score_judges_them() -> None:
     assert found.losses_ == pytest.approx(
         score_steps(count_steps(steps, len(pool.subtasks))).losses, abs=1e-6
     )
-    for reason, flagged, weight in zip(
-        found.reasons_, found.flagged_, found.weights_, strict=True
-    ):
+    for reason, flagged, weight in zip(found.reasons_, found.flagged_, found.weights_, strict=True):
         assert bool(reason) == bool(flagged or weight < 0.8)
         assert reason.startswith("Kept, though odd: ") == bool(reason and not flagged)
