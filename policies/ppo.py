@@ -53,7 +53,8 @@ class PPOConfig:
     epochs: int = 10
     """Passes over the decisions of an update."""
     learning_rate: float = 1e-3
-    """Step size of Adam; SB3's 3e-4 is meant for deep networks, and this policy is log-linear."""
+    """First step size of Adam, which falls linearly to 0; SB3's 3e-4 is meant for deep networks,
+    and this policy is log-linear."""
     gamma: float = 0.99
     """Discount per decision, in (0, 1]."""
     entropy: float = 0.0
@@ -84,6 +85,20 @@ class Update:
     """Their mean sum of rewards; None without episodes."""
     success: float | None
     """Share of them that reached the goal; None without episodes."""
+
+
+class LimitEnds(gym.Wrapper[Any, Any, Any, Any]):
+    """An episode that is cut counts as one that ended: nothing is worth anything afterwards.
+
+    Otherwise PPO continues a cut episode with the estimated value of its last state. That estimate
+    has nothing to hold on to where a policy turns the oven on and off until the limit, so it drifts
+    upwards and the policy learns never to finish.
+    """
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Carry out `action`."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return observation, reward, terminated or truncated, False, info
 
 
 class Curve(BaseCallback):
@@ -164,9 +179,13 @@ def vector_environment(
         ConfigError: there is no such environment, or it does not take the settings.
     """
     make().close()  # a wrong setting is reported here, not by a worker that dies
+
+    def ending() -> gym.Env[Any, Any]:
+        return LimitEnds(make())
+
     if workers.count > 1:
-        return SubprocVecEnv([make] * count, start_method="spawn")
-    return DummyVecEnv([make] * count)
+        return SubprocVecEnv([ending] * count, start_method="spawn")
+    return DummyVecEnv([ending] * count)
 
 
 def _arguments(config: PPOConfig) -> dict[str, Any]:
@@ -174,7 +193,7 @@ def _arguments(config: PPOConfig) -> dict[str, Any]:
         "n_steps": config.horizon,
         "batch_size": min(config.batch, config.horizon * config.environments),
         "n_epochs": config.epochs,
-        "learning_rate": config.learning_rate,
+        "learning_rate": lambda left: left * config.learning_rate,
         "gamma": config.gamma,
         "ent_coef": config.entropy,
         "seed": config.seed,

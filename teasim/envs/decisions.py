@@ -23,7 +23,7 @@ class DecisionWeights(Weights):
     reference: float = 0.0
     """Weight of the share of actions that were the next ones of Seq_1."""
     idle: float = 0.0
-    """Weight of actions without an effect."""
+    """Weight of actions that complete no sub-task for the first time."""
     violations: float = 0.0
     """Weight of violations: breaks of the precedence and spills."""
 
@@ -38,7 +38,7 @@ def decision_terms(
       of a potential, so with a discount of 1 it does not change which policy is best (Ng, Harada &
       Russell, ICML 1999).
     * `reference`: a share for the reference's next sub-task, which the policy accuracy counts.
-    * `idle`: minus a share for an action that completes nothing.
+    * `idle`: minus a share for an action that completes no sub-task for the first time.
     * `violations`: minus a share for every new violation.
 
     Args:
@@ -47,14 +47,14 @@ def decision_terms(
         after: Sub-tasks that were done after it.
         verdicts: The verdicts before and after it.
     """
-    new = len(verdicts[1].violations) - len(verdicts[0].violations)
-    count = len(SUBTASKS)
+    count, completed = len(SUBTASKS), len(set(after)) - len(set(before))
+    violated = len(verdicts[1].violations) - len(verdicts[0].violations)
     return {
         "success": float(verdicts[1].success),
-        "subtasks": (len(set(after)) - len(set(before))) / count,
+        "subtasks": completed / count,
         "reference": float(subtask == next_correct(before)) / count,
-        "idle": -float(len(after) == len(before)) / count,
-        "violations": (0.0 - new) / count,
+        "idle": -float(completed == 0) / count,
+        "violations": (0.0 - violated) / count,
     }
 
 

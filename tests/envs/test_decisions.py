@@ -57,9 +57,10 @@ def test_nothing_is_earned_twice():
         assert total(steps, success=0, reference=1) <= 1 + 1e-9
 
 
-def test_an_action_without_effect_costs_a_share():
+def test_an_action_that_completes_nothing_new_costs_a_share():
     assert terms_of(["stir"])[0]["idle"] == -SHARE
     assert terms_of(["turn_on_oven", "turn_on_oven"])[1]["idle"] == -SHARE
+    assert terms_of(["turn_on_oven", "turn_off_oven", "turn_on_oven"])[2]["idle"] == -SHARE
     assert all(terms["idle"] == 0 for terms in terms_of(SEQ_1))
 
 
