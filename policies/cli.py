@@ -18,6 +18,7 @@ EXAMPLES = {
     "train": (
         "teasim train pool --weights findings/weights.csv -o policy",
         "teasim train pool --learner bc-rnn --set hidden=128 --observe state -o policy",
+        "teasim train pool --learner ppo --from policy -o improved",
     ),
     "evaluate": (
         "teasim evaluate policy --episodes 20 --json scores.json",

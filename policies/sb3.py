@@ -1,20 +1,8 @@
-"""Policies in stable-baselines3: evaluated with its tools, and trained further with PPO.
+"""Policies in stable-baselines3: evaluated with its tools, and converted to and from PPO models.
 
 Every policy has SB3's `predict`, so `evaluate_policy` accepts it unchanged, in an environment of
 `sb3_environment`. A policy that sees the state and is not recurrent can be converted into a PPO
-model with the same probabilities, and trained further by reinforcement:
-
-    from policies import EnvironmentConfig, load_policy
-    from policies.sb3 import as_ppo, sb3_environment
-
-    policy = load_policy(Path("policy"))          # teasim train POOL --observe state -o policy
-    env = sb3_environment(EnvironmentConfig(), policy.spec)
-    model = as_ppo(policy, env, n_steps=64, batch_size=64, learning_rate=1e-4)
-    model.learn(2000)                             # actions, each a whole simulated sub-task
-    model.save("finetuned")
-
-The value network starts untrained: keep the learning rate low, or the meaningless advantages of the
-first updates destroy the cloned behaviour.
+model with the same probabilities, and back; `policies.ppo` trains it in between.
 """
 
 from typing import Any
@@ -24,6 +12,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor
 
 from policies.data.samples import STATE_KEYS, ObservationSpec
@@ -72,17 +61,21 @@ class StandardisedState(BaseFeaturesExtractor):
         return ((state.double() - self.mean) / self.scale).float()
 
 
-def sb3_environment(config: EnvironmentConfig, spec: ObservationSpec) -> gym.Env[Any, Any]:
+def sb3_environment(
+    config: EnvironmentConfig, spec: ObservationSpec, **settings: Any
+) -> gym.Env[Any, Any]:
     """Make the environment for a policy of `spec` in a form that SB3 accepts, in a `Monitor`.
+
+    Further `settings` are passed on to the environment.
 
     Raises:
         ConfigError: there is no such environment, or it does not take the settings.
     """
-    env = make_environment(config, spec)
+    env = make_environment(config, spec, **settings)
     return Monitor(FlatPictures(env) if len(spec.cameras) > 1 else env)
 
 
-def as_ppo(policy: SubtaskPolicy, env: gym.Env[Any, Any], **settings: Any) -> PPO:
+def as_ppo(policy: SubtaskPolicy, env: gym.Env[Any, Any] | VecEnv, **settings: Any) -> PPO:
     """Return a PPO model with the action probabilities of `policy`.
 
     Args:
@@ -113,3 +106,12 @@ def as_ppo(policy: SubtaskPolicy, env: gym.Env[Any, Any], **settings: Any) -> PP
         extractor.mean.copy_(encoder.low_dim_mean)
         extractor.scale.copy_(encoder.low_dim_scale)
     return model
+
+
+def as_policy(model: PPO, like: SubtaskPolicy) -> SubtaskPolicy:
+    """Return the policy of `model`, which `as_ppo` made of `like` and which was trained since."""
+    assert isinstance(like.network, DecisionNetwork)
+    network = DecisionNetwork(like.network.shape, seed=0)
+    network.encoder.load_state_dict(like.network.encoder.state_dict())
+    network.head.load_state_dict(model.policy.action_net.state_dict())
+    return SubtaskPolicy(network, like.spec, like.action_names)

@@ -15,8 +15,13 @@ from teasim.common.workers import WorkerOptions, Workers
 
 SUBTASK_ENVIRONMENT = "teasim:teasim/TeaMakingSubtasks-v0"
 """Gymnasium id of the environment whose actions are sub-tasks."""
+EVENTS_ENVIRONMENT = "teasim:teasim/TeaMakingEvents-v0"
+"""Gymnasium id of the environment whose sub-tasks are drawn instead of simulated."""
 JOINT_ENVIRONMENT = "teasim:teasim/TeaMaking-v0"
 """Gymnasium id of the environment whose actions are joint targets."""
+
+PPO_LEARNER = "ppo"
+"""Name of the learner that learns by reinforcement; the others learn from demonstrations."""
 
 Out = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 Repeated = Annotated[tuple[str, ...], tyro.conf.UseAppendAction]
@@ -96,7 +101,7 @@ class TrainSettings:
     """New folder for the policy."""
     learner: str = "bc"
     """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (robust to incorrect
-    demonstrations); nearest at the level joint."""
+    demonstrations); nearest at the level joint; ppo (by reinforcement)."""
     learner_settings: Assignments = ()
     """Setting of the learner, for example --set hidden=400; an unknown name lists the choices."""
     level: str = "subtask"
@@ -119,6 +124,8 @@ class TrainSettings:
     expert: tuple[int, ...] = ()
     """Episodes known to be good, for a learner that needs experts; default: the quarter with the
     largest weights in the table."""
+    start: Annotated[Path | None, tyro.conf.arg(name="from")] = None
+    """Folder of the policy that ppo trains further; default: it begins with nothing."""
     seed: int = 0
     """Seed of the learner."""
     workers: WorkerOptions = field(default_factory=Workers)

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from policies.checkpoint import AnyPolicy, save_policy
 from policies.data.demos import DemosConfig, load_decisions
@@ -22,12 +22,15 @@ from policies.learners.registry import (
     find_learner,
     learners_that_need,
 )
-from policies.settings import TrainSettings
+from policies.settings import PPO_LEARNER, TrainSettings
 from teasim.common.errors import ConfigError
 from teasim.common.files import check_new_folder
 from teasim.common.workers import Workers
 from teasim.pool import Pool
 from teasim.pool.soundness import print_notes, require_sound
+
+if TYPE_CHECKING:
+    from policies.reinforcement import Reinforcement
 
 RECORDED = ("learner", "level", "observe", "camera", "expert", "seed")
 """Settings that are stored with a policy as they were given."""
@@ -85,7 +88,7 @@ class Training:
         )
 
 
-def train(settings: TrainSettings) -> Training:
+def train(settings: TrainSettings) -> "Training | Reinforcement":
     """Train a policy on the pool and save it in the new folder `settings.out`.
 
     The folder is made last, so a bad input leaves nothing behind.
@@ -94,6 +97,14 @@ def train(settings: TrainSettings) -> Training:
         ConfigError: a name is unknown, the table does not fit the pool, or the folder is in use.
         PoolError: the pool is missing or damaged.
     """
+    if settings.learner == PPO_LEARNER:
+        from policies.reinforcement import reinforce  # loads stable-baselines3
+
+        return reinforce(settings)
+    if settings.start is not None:
+        raise ConfigError(
+            f"The learner '{settings.learner}' takes no --from; only {PPO_LEARNER} does."
+        )
     kind = find_learner(settings.learner, settings.level)
     options = read_options(settings.learner, kind, parse_assignments(settings.learner_settings))
     demos = DemosConfig(observe=settings.observe, cameras=settings.camera)

@@ -1,79 +1,82 @@
-"""Learning curves of PPO in the sub-task environment: from a cloned policy, and from scratch.
+"""PPO from a cloned policy and from nothing: learning curves, and scores in physics.
 
-POLICY is a folder made by `teasim train --observe state`. Both learn in the same few scenes, and a
-sequence of decisions in a scene is simulated once. The reward of an episode is 1 if tea was made.
+POLICY is a folder made by `teasim train --observe state`. Every seed learns in TeaMakingEvents-v0.
+The scores are of scenes in physics (TeaMakingSubtasks-v0) that no policy has seen, the same for
+all; each seed is compared with the cloned policy on the same scenes.
 """
 
 import argparse
 import sys
-from itertools import cycle
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import gymnasium as gym
 import numpy as np
-from stable_baselines3 import PPO
-from stable_baselines3.common.monitor import Monitor
 
-from filtering.vision.determinism import one_thread
-from policies import EnvironmentConfig, load_policy
+from policies import EvaluationConfig, load_policy
+from policies.data.demos import DemosConfig, load_decisions
 from policies.learners.subtask_policy import SubtaskPolicy
-from policies.play.environments import make_environment
-from policies.play.remembering import Remembering
-from policies.sb3 import as_ppo
+from policies.play.comparison import compare, comparison_text
+from policies.play.evaluation import MODES, Scores, evaluate_all
+from policies.ppo import PPOConfig, Update, improve, untrained
+from teasim.pool import Pool
 
-SETTINGS: dict[str, Any] = {"n_steps": 128, "batch_size": 64, "seed": 0}
-
-
-class Scenes(gym.Wrapper[Any, Any, Any, Any]):
-    """Resets to a few scenes in turn, whatever seed is given."""
-
-    def __init__(self, env: gym.Env[Any, Any], count: int) -> None:
-        super().__init__(env)
-        self._seeds = cycle(range(count))
-
-    def reset(self, **_: Any) -> tuple[Any, dict[str, Any]]:
-        """Start the next scene."""
-        return self.env.reset(seed=next(self._seeds))
+TENTHS = 10
+"""Points of a printed learning curve."""
 
 
 def main() -> int:
-    """Print the mean reward and the mean length of each tenth of the episodes."""
+    """Learn, print the curves, score in physics; 1 unless every seed ends above the clone."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("pool", type=Path, help="pool that the policy was cloned from")
     parser.add_argument("policy", type=Path, help="folder of a cloned policy that sees the state")
-    parser.add_argument(
-        "--actions", type=int, default=2000, help="actions (sub-tasks) per learning curve"
-    )
-    parser.add_argument("--scenes", type=int, default=4, help="number of scenes")
-    parser.add_argument("--learning-rate", type=float, default=1e-4, help="step size of PPO")
+    parser.add_argument("--decisions", type=int, default=PPOConfig.decisions, help="per seed")
+    parser.add_argument("--seeds", type=int, default=3, help="number of seeds")
+    parser.add_argument("--episodes", type=int, default=50, help="scenes in physics, per mode")
     arguments = parser.parse_args()
-    settings = SETTINGS | {"learning_rate": arguments.learning_rate}
-    policy = load_policy(arguments.policy)
-    if not isinstance(policy, SubtaskPolicy):
+    cloned = load_policy(arguments.policy)
+    if not isinstance(cloned, SubtaskPolicy):
         parser.error(f"'{arguments.policy}' holds no policy over sub-tasks.")
-    for name in ("cloned", "from scratch"):
-        world = make_environment(EnvironmentConfig(), policy.spec)
-        env = Monitor(Scenes(Remembering(world), arguments.scenes))
-        with one_thread():
-            if name == "cloned":
-                model = as_ppo(policy, env, **settings)
-            else:
-                model = PPO("MultiInputPolicy", env, device="cpu", **settings)
-            model.learn(arguments.actions)
-        print(f"{name}: {len(env.get_episode_rewards())} episodes")
-        parts = zip(
-            np.array_split(env.get_episode_rewards(), 10),
-            np.array_split(env.get_episode_lengths(), 10),
-            strict=True,
-        )
-        for number, (rewards, lengths) in enumerate(parts, start=1):
-            print(
-                f"  tenth {number:2}: tea made in {100 * np.mean(rewards):5.1f} %, "
-                f"{np.mean(lengths):.1f} actions an episode",
-                flush=True,
-            )
-        env.close()
-    return 0
+    samples = load_decisions(Pool.open(arguments.pool), DemosConfig(observe="state"))
+    policies = {"cloned": cloned}
+    for name, start in {"cloned": cloned, "nothing": untrained(samples)}.items():
+        for seed in range(arguments.seeds):
+            config = PPOConfig(decisions=arguments.decisions, seed=seed)
+            config = config if name == "cloned" else replace(config, kept=0)
+            policy, curve = improve(start, config)
+            policies[f"PPO from {name}, seed {seed}"] = policy
+            print_curve(f"PPO from {name}, seed {seed}", curve)
+    config = EvaluationConfig(episodes=arguments.episodes)
+    scores = dict(zip(policies, evaluate_all(list(policies.values()), config), strict=True))
+    print_scores(scores)
+    above = [
+        mode[name].policy_accuracy.value > mode["cloned"].policy_accuracy.value
+        for mode in ({n: s[m] for n, s in scores.items()} for m in MODES)
+        for name in mode
+        if name.startswith("PPO from cloned")
+    ]
+    return 0 if all(above) else 1
+
+
+def print_curve(name: str, curve: tuple[Update, ...]) -> None:
+    """Print the share of episodes that reached the goal in each tenth of the decisions."""
+    parts = np.array_split(np.array([u.success for u in curve if u.success is not None]), TENTHS)
+    shown = " ".join(f"{100 * part.mean():5.1f}" for part in parts if len(part))
+    print(
+        f"{name}, {curve[-1].decisions} decisions; goal reached [%] in each tenth:\n  {shown}",
+        flush=True,
+    )
+
+
+def print_scores(scores: dict[str, dict[str, Scores]]) -> None:
+    """Print the scores of every policy in physics, and its comparison with the cloned one."""
+    for mode in MODES:
+        print(f"{mode} decisions in physics")
+        for name, of in scores.items():
+            s = of[mode]
+            print(f"  {name:26} policy accuracy {s.policy_accuracy}  goal {s.success}")
+    for name, of in scores.items():
+        if name.startswith("PPO from cloned"):
+            print(f"{name}\n{comparison_text(compare(of, scores['cloned']), 'the cloned one')}")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ its children. It never replaces a value that the user has set.
 """
 
 import ctypes
+import gc
 import importlib
 import os
 import platform
@@ -109,6 +110,27 @@ def find_problem(backend: str) -> str | None:
     if backend == "egl" and not _egl_device_starts():
         return "libEGL.so.1 finds no device that starts"
     return None
+
+
+def leave_gl() -> bool:
+    """Close the display through which MuJoCo renders, and with it all threads of OpenGL.
+
+    MuJoCo opens it again for the next renderer. It stays open if a context is in use, for example
+    one of another library, or if the back end is not EGL, which alone can be left.
+
+    Returns:
+        Whether OpenGL does not run in this process any more.
+    """
+    mujoco_egl: Any = sys.modules.get("mujoco.egl")
+    if mujoco_egl is None or mujoco_egl.EGL_DISPLAY is None:
+        return False
+    kind = mujoco_egl.GLContext
+    if any(type(thing) is kind and thing._context for thing in gc.get_objects()):
+        return False
+    mujoco_egl.EGL.eglReleaseThread()
+    mujoco_egl.EGL.eglTerminate(mujoco_egl.EGL_DISPLAY)
+    mujoco_egl.EGL_DISPLAY = None
+    return True
 
 
 def _set_backend(backend: str) -> None:

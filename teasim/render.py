@@ -1,6 +1,7 @@
 """Off-screen renderer of the station: pictures, segmentation masks and depth maps."""
 
 import os
+import weakref
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
@@ -9,7 +10,7 @@ import mujoco
 import numpy as np
 
 from teasim.common.errors import RenderError
-from teasim.gl import choose_gl
+from teasim.gl import choose_gl, leave_gl
 from teasim.world.liquids import VESSELS, Stream
 from teasim.world.looks.borrowing import Borrowed
 from teasim.world.looks.dressing import apply_look
@@ -33,7 +34,8 @@ _PLAIN = {"ground": "ground_plain", "table": "table"}
 _SHOWN_GROUPS = (0, 1, 2)
 _GEOM, _DECORATION = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _STREAM = SEGMENT_NAMES.index("stream")
-_processes: set[int] = set()  # that started OpenGL: this one, or one it was forked from
+_processes: set[int] = set()  # in which OpenGL runs: this one, or one it was forked from
+_renderers: "weakref.WeakSet[StationRenderer]" = weakref.WeakSet()  # that are open
 
 
 class StationRenderer:
@@ -68,7 +70,7 @@ class StationRenderer:
                 rendered.
         """
         check_picture(width, height, quality)
-        check_not_forked()
+        _check_not_forked()
         choose_gl()
         self._simulation = simulation
         self._model = simulation.model
@@ -77,9 +79,11 @@ class StationRenderer:
             self.wear(look)
         self._quality, self._size = quality, (height, width)
         self._set_quality()
-        self._renderer = self._start(SMOOTHING if quality == "nice" else 1)
+        self._renderer: mujoco.Renderer | None = None
         self._meter: mujoco.Renderer | None = None
         self._closed = False
+        self._drawing()
+        _renderers.add(self)
         self._segments = segments(self._model)
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = [group in _SHOWN_GROUPS for group in range(6)]
@@ -104,9 +108,14 @@ class StationRenderer:
             return
         self._closed = True
         self._borrowed.give_back()
-        self._renderer.close()
-        if self._meter is not None:
-            self._meter.close()
+        self.pause()
+
+    def pause(self) -> None:
+        """Close OpenGL until the next picture; what is drawn does not change."""
+        for renderer in (self._renderer, self._meter):
+            if renderer is not None:
+                renderer.close()
+        self._renderer = self._meter = None
 
     def wear(self, look: Look) -> None:
         """Apply another look to the station."""
@@ -146,7 +155,7 @@ class StationRenderer:
             meter.disable_depth_rendering()
 
     def _frame(self, camera: str | mujoco.MjvCamera) -> np.ndarray:
-        picture = self._draw(self._renderer, camera)
+        picture = self._draw(self._drawing(), camera)
         height, width = self._size
         if picture.shape[0] == height:
             return picture
@@ -167,15 +176,22 @@ class StationRenderer:
             _draw_stream(renderer.scene, stream)
         return np.asarray(renderer.render())
 
+    def _drawing(self) -> mujoco.Renderer:
+        """Return the renderer of pictures, started if it does not run."""
+        if self._renderer is None:
+            self._renderer = self._start(SMOOTHING if self._quality == "nice" else 1)
+        return self._renderer
+
     def _measuring(self) -> mujoco.Renderer:
         """Return a renderer without smoothing, which would average segment numbers at edges."""
         if self._quality == "fast":
-            return self._renderer
+            return self._drawing()
         if self._meter is None:
             self._meter = self._start(1)
         return self._meter
 
     def _start(self, scale: int) -> mujoco.Renderer:
+        _check_not_forked()
         height, width = (scale * side for side in self._size)
         buffer = self._model.vis.global_  # as small as possible: it is cleared for each picture
         buffer.offwidth, buffer.offheight = width, height
@@ -204,18 +220,32 @@ class StationRenderer:
             model.geom(geom).matid = model.mat(material).id
 
 
-def check_not_forked() -> None:
-    """Refuse to render after a fork, in which OpenGL's threads are lost and rendering hangs.
+def _check_not_forked() -> None:
+    """Refuse to render after a fork that OpenGL did not survive; rendering would hang.
 
     Raises:
-        RenderError: this process was forked from one that has rendered.
+        RenderError: this process was forked from one in which OpenGL ran and could not be left.
     """
     if _processes and os.getpid() not in _processes:
         raise RenderError(
-            "This process was forked from one that has rendered, which OpenGL does not survive; "
-            "start it with multiprocessing's 'spawn' (vector_kwargs={'context': 'spawn'})."
+            "This process was forked from one in which OpenGL was in use, and rendering would "
+            "hang; start it with multiprocessing's 'spawn' (vector_kwargs={'context': 'spawn'})."
         )
     _processes.add(os.getpid())
+
+
+def _before_fork() -> None:
+    """Leave OpenGL, whose threads a fork would lose; both processes start it again when needed."""
+    if os.getpid() not in _processes:
+        return
+    for renderer in list(_renderers):
+        renderer.pause()
+    if leave_gl():
+        _processes.clear()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which does not fork
+    os.register_at_fork(before=_before_fork)
 
 
 def _draw_stream(scene: Any, stream: Stream) -> None:

@@ -3,6 +3,8 @@
 Every learner obeys: weight 0 equals the demonstration removed, weight 2 equals it twice.
 """
 
+import hashlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, Self, TypeVar
 
@@ -10,6 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from policies.data.samples import DecisionSamples
 from teasim.common.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import WeightRow, match_rows, read_weight_table
@@ -128,6 +131,38 @@ def weigh(
         raise ConfigError("Every demonstration has weight 0, so there is nothing to learn from.")
     counts = each > 0
     return samples.take(counts), each[counts] / each.sum()
+
+
+def distinct(
+    samples: DecisionSamples, shares: NDArray[np.float64], marked: tuple[int, ...] = ()
+) -> tuple[DecisionSamples, NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the demonstrations in an order that depends on their content alone, equal ones merged.
+
+    What is drawn from the result does not depend on the order of the pool, nor on whether a
+    demonstration occurs twice or has twice the weight.
+
+    Args:
+        samples: n decisions.
+        shares: share of the total weight of each, (n,).
+        marked: demonstrations that are not merged with others.
+
+    Returns:
+        The decisions (m, ...), whose demonstrations are numbered 0, 1, ..., their shares (m,), and
+        whether their demonstration is among `marked`, (m,).
+    """
+    found: dict[tuple[bytes, bool], list[NDArray[np.int64]]] = {}
+    for demo in np.unique(samples.demos):
+        rows = np.flatnonzero(samples.demos == demo)
+        key = hashlib.sha256()
+        for part in (samples.maps, samples.low_dim, samples.labels):
+            key.update(part[rows].tobytes())
+        found.setdefault((key.digest(), int(demo) in marked), []).append(rows)
+    order = sorted(found)
+    rows = np.concatenate([found[key][0] for key in order])
+    sums = np.concatenate([np.sum([shares[same] for same in found[key]], axis=0) for key in order])
+    lengths = [len(found[key][0]) for key in order]
+    numbered = replace(samples.take(rows), demos=np.repeat(np.arange(len(order)), lengths))
+    return numbered, sums, np.repeat([mark for _, mark in order], lengths)
 
 
 def weighted_loss(losses: torch.Tensor, shares: torch.Tensor) -> torch.Tensor:

@@ -1,9 +1,9 @@
 """Behavioural cloning from noisy demonstrations (Sasaki & Yamashina, ICLR 2021).
 
-Algorithm 1: an ensemble is cloned in rounds, and each round weights a decision by its probability
-under the ensemble of the previous round, so decisions of a minority lose weight. Sasaki & Yamashina
-give every member a part of the data of its own; here every member is trained on all of it and
-differs by its initial weights, because a dozen demonstrations are too few to divide by five.
+Algorithm 1: the demonstrations are divided into as many disjoint parts as the ensemble has members.
+In every round each member is cloned anew from its part, with decisions weighted by their
+probability under the ensemble of the previous round. A decision that only a minority of the
+demonstrations takes loses weight, for most members have learned otherwise.
 """
 
 from dataclasses import dataclass
@@ -12,11 +12,12 @@ from typing import Self
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 
 from filtering.vision.determinism import one_thread
 from policies.data.moments import weighted_moments
 from policies.data.samples import DecisionSamples
-from policies.data.weighting import weigh
+from policies.data.weighting import distinct, weigh
 from policies.learners.bc import BCConfig, clone, shape_for
 from policies.learners.networks import Ensemble
 from policies.learners.subtask_policy import SubtaskPolicy
@@ -27,10 +28,11 @@ from teasim.common.errors import ConfigError
 class BCNDConfig(BCConfig):
     """Settings of behavioural cloning from noisy demonstrations."""
 
-    steps: int = 40
-    """Gradient steps of every member in every round; a round continues from the previous one."""
+    steps: int = 120
+    """Gradient steps of every member in every round, which begins with new initial weights."""
     members: int = 5
-    """Number of policies in the ensemble."""
+    """K, number of policies in the ensemble, each with a part of the demonstrations of its own; at
+    most one per different demonstration."""
     rounds: int = 5
     """Number of rounds; the first is plain behaviour cloning."""
 
@@ -62,23 +64,36 @@ class BCND:
             ConfigError: the weights do not fit the samples, or all are 0.
         """
         config = self.config
-        samples, shares = weigh(samples, weights)
-        shape = shape_for(samples, config.bottleneck)
-        network = Ensemble(shape, config.seed, config.members)
-        network.standardise(weighted_moments(samples, shares))
+        samples, shares, _ = distinct(*weigh(samples, weights))
+        members = min(config.members, int(samples.demos.max()) + 1)
+        parts = samples.demos % members
+        moments = weighted_moments(samples, shares)
+        seeds = np.random.SeedSequence(config.seed).generate_state(config.rounds).tolist()
         history: list[float] = []
         belief = np.ones(len(shares))
-        for _ in range(config.rounds):
-            products = shares * belief
+        for seed in seeds:
+            network = Ensemble(shape_for(samples, config.bottleneck), seed, members)
+            network.standardise(moments)
             losses = [
-                clone(member, samples, products / products.sum(), config)
-                for member in network.members
+                _clone_part(member, samples, shares * belief, parts == part, config)
+                for part, member in enumerate(network.members)
             ]
             history += np.mean(losses, axis=0).tolist()
             belief = _belief(network, samples)
         self.history_ = tuple(history)
         self.policy_ = SubtaskPolicy(network, samples.spec, samples.action_names)
         return self
+
+
+def _clone_part(
+    member: nn.Module,
+    samples: DecisionSamples,
+    products: NDArray[np.float64],
+    mine: NDArray[np.bool_],
+    config: BCNDConfig,
+) -> tuple[float, ...]:
+    """Clone `member` from the rows `mine` (n,), weighted by `products` (n,)."""
+    return clone(member, samples.take(mine), products[mine] / products[mine].sum(), config)
 
 
 def _belief(network: Ensemble, samples: DecisionSamples) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ over the picture, as in section 3.2 of the paper, and one linear layer scores th
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -183,27 +183,42 @@ class Ensemble(Memoryless):
         return votes.logsumexp(dim=0) - math.log(len(votes))
 
 
+@dataclass(frozen=True)
+class Memory:
+    """Sizes of the memory of a recurrent network."""
+
+    hidden: int
+    """H, size of each layer of the LSTM."""
+    layers: int = 1
+    """L, number of layers."""
+    horizon: int = 0
+    """Decisions after which the memory is cleared; 0: never within an episode."""
+
+
 class RecurrentNetwork(nn.Module):
     """Decisions of an episode in order -> logits; an LSTM encodes what was seen before."""
 
     kind: ClassVar[str] = "recurrent"
 
-    def __init__(self, shape: NetworkShape, seed: int, hidden: int) -> None:
-        """Draw the initial weights from a generator of their own, seeded with `seed`."""
+    def __init__(self, shape: NetworkShape, seed: int, **memory: int) -> None:
+        """Draw the initial weights from `seed`; `memory` has the fields of `Memory`."""
         super().__init__()
         self.shape = shape
-        self.hidden = hidden
+        self.memory = Memory(**memory)
+        hidden = self.memory.hidden
         random = torch.Generator().manual_seed(seed)
         self.encoder = Encoder(shape, random)
-        self.lstm = nn.LSTM(shape.features, hidden, batch_first=True, dtype=torch.float64)
+        self.lstm = nn.LSTM(
+            shape.features, hidden, self.memory.layers, batch_first=True, dtype=torch.float64
+        )
         for parameter in self.lstm.parameters():
             nn.init.uniform_(parameter, -(hidden**-0.5), hidden**-0.5, generator=random)
         self.head = undecided_head(hidden, shape.actions)
 
     @property
     def settings(self) -> Mapping[str, int]:
-        """Size of the hidden state."""
-        return {"hidden": self.hidden}
+        """Sizes of the memory."""
+        return asdict(self.memory)
 
     def standardise(self, moments: Moments) -> None:
         """Set the normaliser from the moments of the training inputs."""
@@ -225,11 +240,29 @@ class RecurrentNetwork(nn.Module):
     def step(
         self, maps: Tensor, low_dim: Tensor, hidden: HiddenState | None
     ) -> tuple[Tensor, HiddenState]:
-        """Return logits (n, A) and the hidden state of the LSTM: output (n, H) and cell (n, H)."""
+        """Return logits (n, A) and what is remembered.
+
+        It is the output of the layers (n, L * H), their cells (n, L * H), and, with a horizon, the
+        number of decisions since the memory was cleared (n, 1).
+        """
         features = self.encoder(maps, low_dim)[:, None]
-        before = None if hidden is None else (hidden[0][None], hidden[1][None])
-        remembered, (output, cell) = self.lstm(features, before)
-        return self.head(remembered[:, 0]), (output[0], cell[0])
+        taken = features.new_zeros(len(features), 1)
+        if hidden is not None and self.memory.horizon:
+            goes_on = hidden[-1] < self.memory.horizon
+            taken = hidden[-1] * goes_on
+            hidden = tuple(part * goes_on for part in hidden)
+        remembered, after = self.lstm(features, None if hidden is None else self._layers(hidden))
+        output, cell = (part.transpose(0, 1).flatten(1) for part in after)
+        counted = (taken + 1,) if self.memory.horizon else ()
+        return self.head(remembered[:, 0]), (output, cell, *counted)
+
+    def _layers(self, hidden: HiddenState) -> tuple[Tensor, Tensor]:
+        """Return output and cell as the LSTM takes them, (L, n, H) each."""
+        output, cell = (
+            part.reshape(len(part), self.memory.layers, -1).transpose(0, 1).contiguous()
+            for part in hidden[:2]
+        )
+        return output, cell
 
 
 def undecided_head(features: int, actions: int) -> nn.Linear:

@@ -19,11 +19,12 @@ World = Callable[[ObservationSpec], gym.Env[Any, Any]]
 
 
 def make_environment(
-    config: EnvironmentConfig, spec: ObservationSpec, *, filmed: bool = False
+    config: EnvironmentConfig, spec: ObservationSpec, *, filmed: bool = False, **settings: Any
 ) -> gym.Env[Any, Any]:
     """Make the environment with the observations that a policy of `spec` needs.
 
-    `filmed` adds rendering for a policy without cameras; a policy with cameras needs none.
+    `filmed` adds rendering for a policy without cameras; a policy with cameras needs none. Further
+    `settings` are passed on to the environment.
 
     Raises:
         ConfigError: there is no such environment, or it does not take the settings.
@@ -34,11 +35,13 @@ def make_environment(
         sight = {"obs_type": "pixels_agent_pos", "cameras": spec.cameras, **size}
     elif filmed:
         sight["render_mode"] = "rgb_array"
+    if len(sight) > 1:
+        sight["quality"] = config.quality  # of pictures, which some environments do not have
     if config.max_actions is not None:
         sight["max_actions"] = config.max_actions
     env_id = config.env_id or SUBTASK_ENVIRONMENT
     try:
-        return gym.make(env_id, quality=config.quality, randomize=config.randomize, **sight)
+        return gym.make(env_id, randomize=config.randomize, **sight, **settings)
     except (gym.error.Error, TypeError, ImportError) as error:
         reason = " ".join(str(error).split())
         raise ConfigError(f"Cannot make the environment '{env_id}': {reason}") from error

@@ -9,11 +9,11 @@ import gymnasium
 import numpy as np
 
 from teasim.common.errors import ConfigError
-from teasim.constants import FPS, SUBTASKS
+from teasim.constants import FPS
 from teasim.envs.observations import observation_space, observe
+from teasim.envs.reports import VIOLATION_METADATA, report
 from teasim.render import StationRenderer
-from teasim.task.recipes import allowed_next, next_correct
-from teasim.task.scoring import VIOLATION_KINDS, VIOLATIONS, Verdict, judge
+from teasim.task.scoring import Verdict, judge
 from teasim.world.looks.look import Look, check_look_kind, fixed_look, sample_look
 from teasim.world.pictures import check_cameras, check_picture
 from teasim.world.simulation import Simulation
@@ -51,8 +51,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
     metadata = {  # noqa: RUF012 (as Gymnasium declares it)
         "render_modes": ["rgb_array"],
         "render_fps": FPS,
-        "violations": dict(VIOLATIONS),
-        "violation_kinds": dict(VIOLATION_KINDS),
+        **VIOLATION_METADATA,
     }
 
     def __init__(
@@ -197,16 +196,4 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         )
 
     def _info(self, verdict: Verdict) -> dict[str, Any]:
-        done = self._simulation.subtasks_done
-        following = next_correct(done)
-        return {
-            "success": verdict.success,
-            "is_success": verdict.success,
-            "subtasks": SUBTASKS,
-            "subtasks_done": done,
-            "correct_action": -1 if following is None else SUBTASKS.index(following),
-            "allowed_actions": tuple(SUBTASKS.index(name) for name in allowed_next(done)),
-            "violations": verdict.violations,
-            "unsafe": verdict.unsafe,
-            "time": np.float64(self._simulation.data.time),
-        }
+        return report(self._simulation.subtasks_done, verdict, self._simulation.data.time)

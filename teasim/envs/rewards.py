@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import Any, Self
 
 from teasim.common.errors import ConfigError
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
@@ -19,8 +19,36 @@ OVEN_SECONDS = 60.0
 """Time for which the oven may be on [s]; the optimal order needs it for about 40 s."""
 
 
+class Weights:
+    """Weights of the named terms of a reward; subclasses are frozen dataclasses."""
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a weight that is no finite number."""
+        for name, weight in vars(self).items():
+            number = isinstance(weight, Real) and not isinstance(weight, bool)
+            if not number or not math.isfinite(weight):
+                raise ConfigError(f"The reward weight of '{name}' is {weight}; give a number.")
+
+    @classmethod
+    def of(cls, given: Mapping[str, float] | None) -> Self:
+        """Return the default weights, replaced by those `given`.
+
+        Raises:
+            ConfigError: there is no term of that name, or a weight is not a finite number.
+        """
+        names = list(cls.__annotations__)
+        for name in given or {}:
+            if name not in names:
+                raise ConfigError(f"Unknown reward term '{name}'; choose {', '.join(names)}.")
+        return cls(**(given or {}))
+
+    def total(self, terms: Mapping[str, float]) -> float:
+        """Return the reward, the weighted sum of the terms."""
+        return float(sum(getattr(self, name) * term for name, term in terms.items()))
+
+
 @dataclass(frozen=True)
-class RewardWeights:
+class RewardWeights(Weights):
     """Weights of the terms of the reward, see `RewardTerms`."""
 
     subtasks: float = 1.0
@@ -33,29 +61,6 @@ class RewardWeights:
     """Weight of a forbidden contact that begins."""
     unsafe: float = 0.1
     """Weight of an episode of full length with the oven on for too long."""
-
-    def __post_init__(self) -> None:
-        for name, weight in asdict(self).items():
-            number = isinstance(weight, Real) and not isinstance(weight, bool)
-            if not number or not math.isfinite(weight):
-                raise ConfigError(f"The reward weight of '{name}' is {weight}; give a number.")
-
-    @classmethod
-    def of(cls, given: Mapping[str, float] | None) -> "RewardWeights":
-        """Return the default weights, replaced by those `given`.
-
-        Raises:
-            ConfigError: there is no term of that name, or a weight is not a finite number.
-        """
-        names = [field.name for field in fields(cls)]
-        for name in given or {}:
-            if name not in names:
-                raise ConfigError(f"Unknown reward term '{name}'; choose {', '.join(names)}.")
-        return cls(**(given or {}))
-
-    def total(self, terms: Mapping[str, float]) -> float:
-        """Return the reward, the weighted sum of the terms."""
-        return float(sum(getattr(self, name) * term for name, term in terms.items()))
 
 
 class RewardTerms(Saved):

@@ -1,13 +1,20 @@
 """`teasim/TeaMakingSubtasks-v0`: every action is a whole sub-task, carried out in full physics."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from teasim.common.errors import ConfigError, SkillError
+from teasim.common.errors import SkillError
 from teasim.constants import CONTROL_TIMESTEP, SUBTASKS
 from teasim.envs.base import StationEnv
+from teasim.envs.decisions import (
+    DecisionWeights,
+    check_max_actions,
+    decision_terms,
+    subtask_of,
+)
 from teasim.rollout import run_subtask
 from teasim.skills.style import Style
 
@@ -19,24 +26,31 @@ class TeaMakingSubtasksEnv(StationEnv):
     """Choose the next sub-task; a scripted skill carries it out.
 
     When an action cannot be carried out, for example a second tea bag, the robot waits for a moment
-    and `info["refused"]` says why. The reward is 1 when the goal is reached, 0 otherwise.
+    and `info["refused"]` says why. The reward is 1 when the goal is reached, 0 otherwise, unless
+    `reward_weights` gives weights to other terms of `decision_terms`.
     """
 
-    def __init__(self, *, max_actions: int = 14, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        *,
+        max_actions: int = 14,
+        reward_weights: Mapping[str, float] | None = None,
+        **kwargs: Any,
+    ) -> None:
         """Build the station.
 
         Args:
             max_actions: The episode is truncated after this number of actions.
+            reward_weights: Weights of terms of the reward that replace those of `DecisionWeights`.
             **kwargs: The arguments of `StationEnv`.
 
         Raises:
             ConfigError: an argument is unknown or out of range.
         """
+        self._weights = DecisionWeights.of(reward_weights)
+        self._max_actions = check_max_actions(max_actions)
         super().__init__(**kwargs)
-        if max_actions < 1:
-            raise ConfigError(f"max_actions is {max_actions}; choose 1 or more.")
         self.action_space = spaces.Discrete(len(SUBTASKS))
-        self._max_actions = max_actions
         self._actions = 0
 
     def reset(
@@ -52,12 +66,14 @@ class TeaMakingSubtasksEnv(StationEnv):
         Raises:
             ConfigError: there is no sub-task of that number; nothing has moved then.
         """
-        refused = self._carry_out(_subtask(action))
+        subtask, before, done = subtask_of(action), self._verdict(), self._simulation.subtasks_done
+        refused = self._carry_out(subtask)
         self._actions += 1
         verdict = self._verdict()
-        reward = float(verdict.success)
-        info = self._info(verdict) | {"refused": refused, "reward_terms": {"success": reward}}
+        terms = decision_terms(subtask, done, self._simulation.subtasks_done, (before, verdict))
+        info = self._info(verdict) | {"refused": refused, "reward_terms": terms}
         truncated = not verdict.success and self._actions >= self._max_actions
+        reward = self._weights.total(terms)
         return self._observation(), reward, verdict.success, truncated, info
 
     def _carry_out(self, subtask: str) -> str:
@@ -79,10 +95,3 @@ class TeaMakingSubtasksEnv(StationEnv):
 
     def _set_progress(self, progress: Any) -> None:
         self._actions = progress
-
-
-def _subtask(action: Any) -> str:
-    number = np.asarray(action)
-    if number.dtype.kind in "iu" and number.size == 1 and 0 <= number.item() < len(SUBTASKS):
-        return SUBTASKS[number.item()]
-    raise ConfigError(f"Unknown action {action!r}; choose a number from 0 to {len(SUBTASKS) - 1}.")

@@ -56,10 +56,15 @@ def effective(steps: Sequence[str]) -> tuple[bool, ...]:
     happened: list[str] = []
     effects = []
     for name in steps:
-        effects.append(_has_effect(find_subtask(name), [REGISTRY[before] for before in happened]))
+        effects.append(has_effect(name, happened))
         if effects[-1]:
             happened.append(name)
     return tuple(effects)
+
+
+def has_effect(name: str, done: Sequence[str]) -> bool:
+    """Whether the sub-task `name` has an effect, carried out well after the events `done`."""
+    return _has_effect(find_subtask(name), [REGISTRY[before] for before in done])
 
 
 def recognisable(steps: Sequence[str]) -> tuple[str, ...]:

@@ -9,17 +9,25 @@ import pytest
 from teasim.common.errors import ConfigError
 from teasim.constants import STATE_NAMES
 from teasim.envs.actions import CONTROLS
+from teasim.envs.decisions import DecisionWeights
 from teasim.envs.observations import OBS_TYPES
 from teasim.envs.registration import register_envs
 from teasim.envs.rewards import RewardWeights
 
 VARIANTS = {control: ("TeaMaking", {"control": control}) for control in CONTROLS}
 VARIANTS["subtasks"] = ("TeaMakingSubtasks", {})
+SHAPED = {"reward_weights": {"subtasks": 1.0, "reference": 0.5, "idle": 2.0, "violations": 1.0}}
+VARIANTS["shaped"] = ("TeaMakingSubtasks", SHAPED)
+BLIND = {"events": ("TeaMakingEvents", {}), "shaped events": ("TeaMakingEvents", SHAPED)}
+"""Variants without pictures: they have no other view than `state`, and no `render`."""
 SMALL = {"width": 32, "height": 24, "render_mode": "rgb_array"}
 CAMERAS = {"state": ("cup",), "pixels": ("cup",), "pixels_agent_pos": ("cup", "left")}
 
-each_variant = pytest.mark.parametrize("variant", VARIANTS)
-each_view = pytest.mark.parametrize("view", OBS_TYPES)
+each_variant = pytest.mark.parametrize("variant", [*VARIANTS, *BLIND])
+each_sight = pytest.mark.parametrize(
+    ("variant", "view"),
+    [*((v, view) for v in VARIANTS for view in OBS_TYPES), *((v, "state") for v in BLIND)],
+)
 pytestmark = pytest.mark.usefixtures("quick")
 
 
@@ -30,9 +38,10 @@ def build():
 
     def build(variant: str, view: str = "state", copy: int = 0) -> gymnasium.Env:
         if (variant, view, copy) not in made:
-            name, kwargs = VARIANTS[variant]
+            name, kwargs = (VARIANTS | BLIND)[variant]
+            sight = {} if variant in BLIND else {"cameras": CAMERAS[view], **SMALL}
             made[variant, view, copy] = gymnasium.make(
-                f"teasim:teasim/{name}-v0", obs_type=view, cameras=CAMERAS[view], **SMALL, **kwargs
+                f"teasim:teasim/{name}-v0", obs_type=view, **sight, **kwargs
             )
         return made[variant, view, copy]
 
@@ -57,7 +66,12 @@ def actions_for(env: gymnasium.Env, count: int) -> list:
 
 def run(env: gymnasium.Env, actions: list) -> list:
     """Everything that steps return and the pictures between them, as bits."""
-    return [[bits(part) for part in (*env.step(action), env.render())] for action in actions]
+    return [[bits(part) for part in (*env.step(action), look(env))] for action in actions]
+
+
+def look(env: gymnasium.Env) -> object:
+    """The picture that is shown now; None where there are none."""
+    return env.render() if env.render_mode else None
 
 
 def episode(env: gymnasium.Env, actions: list) -> list:
@@ -90,14 +104,13 @@ def check_observations(env: gymnasium.Env, before: dict, after: dict) -> None:
 def test_no_registered_environment_is_left_out():
     register_envs()
     ours = {name for name in gymnasium.registry if name.startswith("teasim/")}
-    assert {f"teasim/{name}-v0" for name, _ in VARIANTS.values()} == ours
+    assert {f"teasim/{name}-v0" for name, _ in (VARIANTS | BLIND).values()} == ours
 
 
-@each_view
-@each_variant
+@each_sight
 def test_what_comes_back_is_what_the_spaces_and_the_specification_say(build, variant, view):
     env = build(variant, view)
-    assert env.spec.id == f"teasim/{VARIANTS[variant][0]}-v0"
+    assert env.spec.id == f"teasim/{(VARIANTS | BLIND)[variant][0]}-v0"
     observation, info = env.reset(seed=0)
     assert isinstance(info, dict)
     for action in actions_for(env, 2):
@@ -107,13 +120,13 @@ def test_what_comes_back_is_what_the_spaces_and_the_specification_say(build, var
         check_observations(env, before, observation)
         assert [type(x) for x in (reward, terminated, truncated)] == [float, bool, bool]
         assert np.isfinite(reward)
-    picture = env.render()
-    assert (picture.shape, picture.dtype) == ((24, 32, 3), np.uint8)
-    assert np.ptp(picture) > 50
+    if env.render_mode:
+        picture = env.render()
+        assert (picture.shape, picture.dtype) == ((24, 32, 3), np.uint8)
+        assert np.ptp(picture) > 50
 
 
-@each_view
-@each_variant
+@each_sight
 def test_a_seed_gives_the_same_bits_in_another_instance_and_after_another_reset(
     build, variant, view
 ):
@@ -124,15 +137,14 @@ def test_a_seed_gives_the_same_bits_in_another_instance_and_after_another_reset(
     assert episode(env, actions) == first
 
 
-@each_view
-@each_variant
+@each_sight
 def test_going_back_to_a_state_and_on_gives_the_same_bits(build, variant, view):
     env = build(variant, view)
     env.reset(seed=1)
     before, after = np.split(np.array(actions_for(env, 5)), [2])
     for action in before:
         env.step(action)
-    picture = env.render()
+    picture = bits(look(env))
     state = pickle.loads(pickle.dumps(env.get_wrapper_attr("get_state")()))
     kept = pickle.dumps(state)
     expected = run(env, after)
@@ -141,7 +153,7 @@ def test_going_back_to_a_state_and_on_gives_the_same_bits(build, variant, view):
     other.reset(seed=9)
     for one in (env, other):
         one.get_wrapper_attr("set_state")(state)
-        assert (one.render() == picture).all()
+        assert bits(look(one)) == picture
         assert run(one, after) == expected
         assert bits(one.reset()[0]) == reset_next  # the generator went back, too
     assert pickle.dumps(state) == kept
@@ -151,10 +163,12 @@ def test_going_back_to_a_state_and_on_gives_the_same_bits(build, variant, view):
 def test_the_reward_is_the_weighted_sum_of_its_terms(build, variant):
     env = build(variant)
     env.reset(seed=0)
+    kind = RewardWeights if variant in CONTROLS else DecisionWeights
+    weights = kind.of((VARIANTS | BLIND)[variant][1].get("reward_weights"))
     for action in actions_for(env, 6):
         _, reward, _, _, info = env.step(action)
         terms = info["reward_terms"]
-        assert reward == RewardWeights().total(terms)
+        assert reward == weights.total(terms)
         assert all(np.isfinite(term) for term in terms.values())
 
 
@@ -165,6 +179,14 @@ def test_the_state_of_another_environment_is_refused(build):
     with pytest.raises(ConfigError) as error:
         subtasks.set_state(state)
     assert str(error.value) == "The state is of TeaMakingEnv; this is TeaMakingSubtasksEnv."
+    events = build("events").unwrapped
+    events.reset(seed=0)
+    with pytest.raises(ConfigError) as error:
+        events.set_state(state)
+    assert str(error.value) == "The state is of TeaMakingEnv; this is TeaMakingEventsEnv."
+    with pytest.raises(ConfigError) as error:
+        joints.set_state(events.get_state())
+    assert str(error.value) == "The state is of TeaMakingEventsEnv; this is TeaMakingEnv."
 
 
 @pytest.mark.parametrize("control", CONTROLS)

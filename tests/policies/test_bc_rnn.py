@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from policies.checkpoint import load_policy, save_policy
 from policies.data.samples import DecisionSamples, ObservationSpec
-from policies.learners.bc_rnn import places
+from policies.learners.bc_rnn import places, windows
+from teasim.common.errors import ConfigError
 from tests.policies.learning import make, replay
 
 SPEC = ObservationSpec((), 0, 0, ("hint",), ("noise",))
@@ -62,3 +64,59 @@ def test_the_memory_restarts_where_an_episode_does(recall):
 def test_places_of_decisions_in_their_demonstrations():
     found = places(np.array([4, 4, 7, 4, 7, 9]))
     assert found.tolist() == [[0, 0], [0, 1], [1, 0], [0, 2], [1, 1], [2, 0]]
+
+
+def test_windows_are_all_runs_of_the_horizon():
+    rows, found = windows(places(np.array([4, 4, 7, 4, 7, 4])), 3)
+    assert rows.tolist() == [0, 1, 3, 1, 3, 5, 2, 4]
+    assert found.tolist() == [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2], [2, 0], [2, 1]]
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_a_horizon_that_covers_the_episode_changes_nothing(recall, layers):
+    settings = {"layers": layers, "steps": 40}
+    whole = make("bc-rnn", **settings).fit(recall, np.ones(12)).policy_
+    same = make("bc-rnn", horizon=3, **settings).fit(recall, np.ones(12)).policy_
+    np.testing.assert_allclose(replay(same, recall), replay(whole, recall), rtol=1e-9)
+
+
+def test_what_lies_beyond_the_horizon_is_forgotten(recall):
+    """The hint is shown two decisions before it is needed."""
+    forgetting = make("bc-rnn", horizon=2).fit(recall, np.ones(12)).policy_
+    last = replay(forgetting, recall)[2::3]
+    np.testing.assert_allclose(last[::2], last[1::2], atol=1e-9)
+
+
+def test_with_a_horizon_each_decision_counts_once(recall):
+    """The share of a decision is divided among its windows, so the first loss is that of no one."""
+    learner = make("bc-rnn", horizon=2, steps=1).fit(recall, np.ones(12))
+    assert learner.history_[0] == pytest.approx(np.log(3))
+
+
+def test_two_layers_and_a_horizon_are_saved(recall, tmp_path):
+    published = {"hidden": 400, "layers": 2, "horizon": 10, "steps": 1}
+    policy = make("bc-rnn", **published).fit(recall, np.ones(12)).policy_
+    save_policy(policy, tmp_path, training={})
+    again = load_policy(tmp_path)
+    assert again.network.settings == {"hidden": 400, "layers": 2, "horizon": 10}
+    np.testing.assert_array_equal(replay(again, recall), replay(policy, recall))
+
+
+def test_a_network_of_one_layer_that_was_saved_before_is_read(recall):
+    network = make("bc-rnn", steps=1).fit(recall, np.ones(12)).policy_.network
+    before = type(network)(network.shape, 0, hidden=64)
+    before.load_state_dict(network.state_dict())
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ({"hidden": 0}, "bc-rnn needs hidden >= 1 and layers >= 1."),
+        ({"layers": 0}, "bc-rnn needs hidden >= 1 and layers >= 1."),
+        ({"horizon": 0}, "horizon is 0; choose 1 or more, or none."),
+    ],
+)
+def test_a_memory_of_no_size_is_refused(setting, sentence):
+    with pytest.raises(ConfigError) as error:
+        make("bc-rnn", **setting)
+    assert str(error.value) == sentence

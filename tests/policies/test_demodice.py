@@ -31,14 +31,14 @@ def chain_of(samples, experts=EXPERTS):
     encoder = Encoder(
         NetworkShape(0, 0, samples.low_dim.shape[1], 0, samples.n_actions), torch.Generator()
     )
-    return make_chain(encoder, samples, np.full(len(samples.labels), 1 / 8), experts)
+    good = np.isin(samples.demos, experts)
+    return make_chain(encoder, samples, np.full(len(samples.labels), 1 / 8), good)
 
 
 def exact(**settings):
-    """Without the penalty, and trained until nothing moves, c and nu are what they estimate."""
-    return DemoDICEConfig(
-        gradient_penalty=0.0, ratio_steps=600, ratio_learning_rate=1e-2, **settings
-    )
+    """Without penalties, and trained until nothing moves, c and nu are what they estimate."""
+    free = {"gradient_penalty": 0.0, "nu_penalty": 0.0, "mixtures": 1}
+    return DemoDICEConfig(**free, ratio_steps=600, ratio_learning_rate=1e-2, **settings)
 
 
 def test_the_rewards_are_the_logarithms_of_the_density_ratios():
@@ -61,32 +61,82 @@ def test_without_alpha_the_corrections_are_the_density_ratios():
 @pytest.mark.parametrize("alpha", [0.05, 1.0])
 def test_alpha_pulls_the_policy_towards_the_union(alpha):
     """pi*(0) / pi*(1) = (d_E ratio)^(1 / (1 + alpha)), since both lead to the same state."""
-    learner = make("demodice", experts=EXPERTS, alpha=alpha, gradient_penalty=0.0, steps=400)
+    free = {"gradient_penalty": 0.0, "nu_penalty": 0.0, "ratio_steps": 300, "mixtures": 1}
+    learner = make("demodice", experts=EXPERTS, alpha=alpha, steps=400, **free)
     policy = learner.fit(bandit(), np.ones(8)).policy_
     odds = 3 ** (1 / (1 + alpha))
     chances, _ = policy.decide(np.zeros((1, 0, 0, 1, 1), np.float16), np.zeros((1, 1), np.float32))
     np.testing.assert_allclose(chances[0], [odds / (1 + odds), 1 / (1 + odds)], atol=0.03)
 
 
+THINGS = 20
+"""Numbers of the state that have nothing to do with the decision: where things happen to stand."""
+
+
+def corridor(labels, spread):
+    """Demonstrations (D, 3) of two choices in three states in a row; things vary by `spread`."""
+    count, length = labels.shape
+    things = np.random.default_rng(0).normal(0, spread, (labels.size, THINGS))
+    states = np.hstack([np.tile(np.eye(length), (count, 1)), things])
+    return DecisionSamples(
+        np.zeros((labels.size, 1, 0, 0, 1, 1), dtype=np.float16),
+        states.astype(np.float32),
+        labels.ravel().astype(np.int64),
+        np.repeat(np.arange(count), length),
+        ObservationSpec((), 0, 0, tuple(f"number_{n}" for n in range(length + THINGS))),
+        ("a", "b"),
+    )
+
+
+def erring(count, of):
+    """Choices (of, 3), 0 throughout; the last `count` demonstrations take 1 in the second state."""
+    labels = np.zeros((of, 3), dtype=np.int64)
+    labels[of - count :, 1] = 1
+    return labels
+
+
+def mean_weights(learner):
+    """Weight of the decisions in the second state: of those that took 0, of those that took 1."""
+    weights = learner.decision_weights_.reshape(-1, 3)[:, 1]
+    labels = learner.samples_.labels.reshape(-1, 3)[:, 1]
+    return tuple(weights[labels == kind].mean() for kind in (0, 1))
+
+
 def test_what_experts_never_do_counts_less():
     """Three states in a row; the last of five demonstrations errs in the second."""
-    labels = np.zeros((5, 3), dtype=np.int64)
-    labels[4, 1] = 1
-    states = np.tile(np.eye(3, dtype=np.float32), (5, 1))
-    spec = ObservationSpec((), 0, 0, ("x", "y", "z"))
-    maps = np.zeros((15, 1, 0, 0, 1, 1), dtype=np.float16)
-    samples = DecisionSamples(
-        maps, states, labels.ravel(), np.repeat(np.arange(5), 3), spec, ("a", "b")
-    )
+    samples = corridor(erring(1, of=5), spread=0.0)
     learner = make("demodice", experts=(0,), ratio_steps=300).fit(samples, np.ones(5))
-    by_demo = learner.decision_weights_.reshape(5, 3)
-    np.testing.assert_allclose(by_demo[1:4], by_demo[:3], rtol=1e-9)
-    assert by_demo[4, 1] < 0.3 * by_demo[3, 1]
+    right, wrong = mean_weights(learner)
+    assert wrong < 0.5 * right
+
+
+FEW = {"experts": (0, 1), "ratio_steps": 200, "mixtures": 32}
+"""Two experts, three other good demonstrations and seven that err, in states that never recur."""
+
+
+def test_a_free_nu_cancels_the_rewards_where_no_state_recurs():
+    """Every demonstration is a chain of its own, so the flow leaves nothing to choose."""
+    samples = corridor(erring(7, of=12), spread=0.3)
+    learner = make("demodice", nu_penalty=0.0, **FEW).fit(samples, np.ones(12))
+    np.testing.assert_allclose(learner.decision_weights_, 1.0, atol=0.03)
+    right, wrong = mean_weights(learner)
+    assert wrong == pytest.approx(right, rel=1e-3)
+
+
+def test_a_smooth_nu_separates_them_and_plain_cloning_follows_the_majority():
+    samples = corridor(erring(7, of=12), spread=0.3)
+    learner = make("demodice", steps=300, nu_penalty=0.1, **FEW).fit(samples, np.ones(12))
+    right, wrong = mean_weights(learner)
+    assert wrong < 0.3 * right
+    cloned = make("bc", steps=300).fit(samples, np.ones(12)).policy_
+    second = (np.zeros((1, 0, 0, 1, 1), np.float16), np.eye(3 + THINGS, dtype=np.float32)[1:2])
+    assert cloned.decide(*second)[0].argmax() == 1
+    assert learner.policy_.decide(*second)[0].argmax() == 0
 
 
 def test_the_chain_follows_each_demonstration_to_the_end(samples):
     encoder = Encoder(NetworkShape(2, 4, 2, 0, 3), torch.Generator())
-    chain = make_chain(encoder, samples, np.full(30, 1 / 30), (1,))
+    chain = make_chain(encoder, samples, np.full(30, 1 / 30), samples.demos == 1)
     assert chain.following[:6].tolist() == [1, 2, 3, 4, 5, 30]
     assert chain.following[30] == 30
     assert np.flatnonzero(chain.first).tolist() == [0, 6, 12, 18, 24]

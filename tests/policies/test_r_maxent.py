@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import minimize
 
 from policies.learners.r_maxent import (
     Problem,
@@ -94,3 +95,58 @@ def test_the_demonstration_that_errs_is_not_trusted(samples):
 def test_one_the_pool_gives_no_weight_is_not_asked(samples):
     weights = make("r-maxent").fit(samples, np.array([1.0, 1, 0, 1, 1])).demo_weights_
     assert weights.shape == (4,)
+
+
+def long_adversaries():
+    """A chain of four states: three demonstrations go on, two go back, three times as often.
+
+    Most decisions are wrong, most demonstrations are right.
+    """
+    good, bad = np.arange(4), np.tile(np.arange(4), 3)
+    states = np.concatenate([good, good, good, bad, bad])
+    labels = np.repeat([0, 1], [12, 24])
+    demos = np.repeat(np.arange(5), [4, 4, 4, 12, 12])
+    return Problem(np.eye(4)[states], labels, demos, np.ones(5), 2)
+
+
+def test_adversaries_that_outvote_every_decision_are_found_and_plain_cloning_is_misled():
+    problem = long_adversaries()
+    cloned = fit_multipliers(
+        problem, np.bincount(problem.demos) / len(problem.labels), np.zeros((4, 2)), 1e-2
+    )
+    assert (cloned.argmax(axis=1) == 1).all()
+    solution = solve(problem, RMaxEntConfig())
+    np.testing.assert_allclose(solution.weights, [5 / 6] * 3 + [0, 0], atol=1e-6)
+    assert (solution.multipliers.argmax(axis=1) == 0).all()
+
+
+def objective(problem, weights, multipliers, ridge):
+    """Equation 3 with the ridge, without the entropy."""
+    trusted = problem.copies.sum() / 2
+    losses = demo_losses(problem, multipliers)
+    return float(weights @ losses / trusted + ridge / 2 * (multipliers**2).sum())
+
+
+@pytest.mark.parametrize("problem", [five_states(), five_states(wrong=(1, 3), demos=6)])
+def test_it_is_at_least_as_good_as_the_solver_of_the_paper(problem):
+    """Sequential quadratic programming over lambda and w at once, from lambda 0 and equal weights.
+
+    Both trust the same demonstrations.
+    """
+    ridge, demos, size = 0.02, len(problem.copies), problem.features.shape[1] * 2
+
+    def value(point):
+        return objective(problem, point[:demos], point[demos:].reshape(-1, 2), ridge)
+
+    start = np.append(np.full(demos, 0.5), np.zeros(size))
+    theirs = minimize(
+        value,
+        start,
+        method="SLSQP",
+        bounds=[(0, 1)] * demos + [(None, None)] * size,
+        constraints={"type": "eq", "fun": lambda point: point[:demos].sum() - demos / 2},
+        options={"maxiter": 500, "ftol": 1e-12},
+    )
+    ours = solve(problem, RMaxEntConfig(ridge=ridge))
+    assert objective(problem, ours.weights, ours.multipliers, ridge) <= theirs.fun + 1e-4
+    assert theirs.x[demos - 1] == pytest.approx(ours.weights[-1], abs=1e-3)
