@@ -361,10 +361,13 @@ from the whole video.
             self.summary_ = summarise(self.segments_, self.weights_, self.flagged_, self.config)
         decided = [f"{words}." for words in self.decision_.words] if self.decision_ else []
         warning = caution(len(self.weights_))
+        by_steps = self.summary_.words if self.summary_ else ()
+        if self.chosen_.score == COMBINED:  # moments may see more than the found sub-tasks
+            by_steps = tuple(f"By the found sub-tasks: {w[0].lower()}{w[1:]}" for w in by_steps)
         self.words_ = (
             *self._notes,
             *decided,
-            *(self.summary_.words if self.summary_ else ()),
+            *by_steps,
             *([warning] if warning else []),
         )
 
