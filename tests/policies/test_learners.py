@@ -161,15 +161,20 @@ def test_no_learner_starts_with_settings_that_cannot_train(name):
             "A learner needs steps >= 1, learning_rate > 0 and weight_decay >= 0.",
         ),
         ("bc", {"bottleneck": 0}, "bottleneck is 0; choose 1 or more."),
-        ("bc-rnn", {"hidden": 0}, "hidden is 0; choose 1 or more."),
+        ("bc-rnn", {"hidden": 0}, "bc-rnn needs hidden >= 1 and layers >= 1."),
         ("nearest", {"chunk": 0}, "chunk is 0; choose 1 or more."),
         ("bcnd", {"members": 0}, "bcnd needs members >= 1 and rounds >= 1."),
         ("demodice", {"gamma": 1.0}, "gamma is 1.0; choose more than 0 and less than 1."),
-        ("demodice", {"alpha": -1.0}, "demodice needs alpha >= 0 and gradient_penalty >= 0."),
+        (
+            "demodice",
+            {"alpha": -1.0},
+            "demodice needs alpha >= 0, gradient_penalty >= 0 and nu_penalty >= 0.",
+        ),
         (
             "demodice",
             {"hidden": 0},
-            "demodice needs hidden >= 1, ratio_steps >= 1 and ratio_learning_rate > 0.",
+            "demodice needs hidden >= 1, mixtures >= 1, ratio_steps >= 1 and "
+            "ratio_learning_rate > 0.",
         ),
         ("r-maxent", {"trusted": 1.0}, "trusted is 1.0; choose more than 0 and less than 1."),
         ("r-maxent", {"ridge": 0.0}, "r-maxent needs ridge > 0 and steps >= 1."),
