@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -51,6 +51,9 @@ class FilterCommand:
     """Where the work runs."""
     overwrite: bool = False
     """Replace the output of an earlier filter in the output folder."""
+    embed: Literal["auto", "all", "none"] = "auto"
+    """Put the videos into report.html (all), or into the folder videos beside it (none). auto: into
+    the page if they have at most 12 MB."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError if `max_flagged` is not a share."""
@@ -132,7 +135,12 @@ def _filter(command: FilterCommand) -> int:
     check_output(command.out, pool.root, overwrite=command.overwrite)
     fitted = fit_by_task(command.config, pool, workers=command.workers)
     write_filter_output(
-        command.out, pool, fitted, overwrite=command.overwrite, workers=command.workers
+        command.out,
+        pool,
+        fitted,
+        overwrite=command.overwrite,
+        embed=command.embed,
+        workers=command.workers,
     )
     _print_result(pool, fitted)
     page = command.out / "report.html"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from filtering.demo_filter import DemoFilter, caution
 from filtering.judging.explain import Clock
 from filtering.report import ReportSection, render_report
-from filtering.report.videos import FOLDER, foreign_videos, remove_videos
+from filtering.report.videos import FOLDER, Embed, foreign_videos, remove_videos
 from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
 from teasim.common.errors import ConfigError, TeasimError
@@ -76,11 +76,12 @@ def write_filter_output(
     *,
     sections: Sequence[ReportSection] = (),
     overwrite: bool = False,
+    embed: Embed = "auto",
     workers: Workers = IN_PROCESS,
 ) -> None:
     """Write FILES to the folder `out`, each atomically, the page last.
 
-    Videos that are too large to embed in the page are in a folder `videos` beside it.
+    Videos that are not embedded in the page are in a folder `videos` beside it.
 
     An error while the page is made becomes a warning on stderr: the results are already written.
 
@@ -90,6 +91,7 @@ def write_filter_output(
         fitted: the filter after `fit(pool)`.
         sections: further sections of the page.
         overwrite: replace an earlier output.
+        embed: whether the page holds its videos: all, none, or auto, where they are small.
         workers: where the videos of the page are encoded.
 
     Raises:
@@ -107,7 +109,7 @@ def write_filter_output(
     try:
         render_report(
             folder / "report.html",
-            demos=demo_views(pool, fitted, folder, workers=workers),
+            demos=demo_views(pool, fitted, folder, embed=embed, workers=workers),
             threshold=fitted.threshold_,
             subtasks=fitted.segments_.subtasks,
             sections=[*([_words_section(fitted)] if fitted.words_ else []), *sections],
