@@ -1,5 +1,6 @@
 """Positions on the page: dots of the strip plot, marks above a timeline."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,8 +12,8 @@ TALLEST = 220.0
 """Greatest height of a stack [px]; dots of taller ones become flatter."""
 FLAT = 6.0
 """Least height of a round dot [px]; flatter ones are drawn as bars, in columns."""
-MARK_WIDTH = 22.0
-"""Width of the text of a mark [% of the timeline]."""
+MARK_WIDTH = 40.0
+"""Greatest width of the text of a mark [% of the timeline]; the page cuts a longer one off."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +83,13 @@ def strip_of(weights: Sequence[float]) -> Strip:
     highest = 1 + max((dot.level for dot in dots), default=0)
     if TALLEST / highest >= FLAT:
         return Strip(tuple(dots), min(STACK, TALLEST / highest), bars=False)
-    dots = place_dots([DOT_WIDTH * round(weight / DOT_WIDTH) for weight in weights])
-    highest = 1 + max(dot.level for dot in dots)
-    return Strip(tuple(dots), TALLEST / highest, bars=True)
+    columns: Counter[int] = Counter()
+    bars = []
+    for weight in weights:
+        column = round(weight / DOT_WIDTH)
+        bars.append(Dot(column * DOT_WIDTH, columns[column]))
+        columns[column] += 1
+    return Strip(tuple(bars), TALLEST / max(columns.values()), bars=True)
 
 
 def place_marks(marks: Sequence[Mark], longest: float) -> list[PlacedMark]:

@@ -14,7 +14,7 @@ const kept = (() => {
 const keep = () => { try { localStorage.setItem(key, JSON.stringify(kept)); } catch { /* only this visit */ } };
 
 // Videos are loaded when they are asked for, and one plays at a time.
-let films = null;
+let films = null, latest = null;
 const living = [];
 const address = (episode, camera) => {
   films ??= JSON.parse(element("films").textContent);
@@ -47,7 +47,8 @@ function film(player) {
 function play(player, start, stop) {
   const video = film(player);
   player.dataset.until = stop ?? "";
-  const go = () => { if (start !== undefined) video.currentTime = start; video.play().catch(() => {}); };
+  latest = player; // a video that is still loading when another one is asked for does not start
+  const go = () => { if (latest !== player) return; if (start !== undefined) video.currentTime = start; video.play().catch(() => {}); };
   if (video.readyState) go(); else video.addEventListener("loadedmetadata", go, { once: true });
 }
 function follow(player, video) {

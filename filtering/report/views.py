@@ -148,12 +148,23 @@ def _capital(name: str) -> str:
 
 def marks_of(findings: Sequence[Finding], clock: Clock) -> tuple[Mark, ...]:
     """Mark what is missing and the largest other findings; smaller ones follow from those."""
-    return tuple(Mark(clock.time(item.frame), _words(item)) for item in shown(findings))
+    return tuple(Mark(clock.time(item.frame), _brief(item)) for item in shown(findings))
+
+
+def _brief(finding: Finding) -> str:
+    """Return the text of a mark; a moment has no name, and its place in another video is long."""
+    if finding.counterpart is None:
+        return _words(finding)
+    if finding.ineffective is not None:
+        return "without effect"
+    if finding.came is not None:
+        return "at an unusual place"
+    return "something is missing" if finding.missing else "few others show this"
 
 
 def _words(finding: Finding) -> str:
     if finding.ineffective is not None:
         return f"{finding.ineffective.subtask} was ineffective"
     if finding.expected is None:
-        return "the end was expected"
+        return "the end was expected" if finding.counterpart is None else "few others show this"
     return f"{finding.expected} {'is missing' if finding.missing else 'expected'}"
