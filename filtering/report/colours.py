@@ -18,8 +18,8 @@ PALETTE = (
 """Colours of the first sub-tasks in their order."""
 GOLDEN_ANGLE = 137.508
 """Further colours are this far apart on the colour wheel [degrees]."""
-INKS = ("#101416", "#ffffff")
-"""Text colours; one of them has a contrast of 4.5 or more with any colour."""
+INKS = ("#000000", "#ffffff")
+"""Text colours; one of them has a contrast of 4.58 or more with any colour."""
 
 
 def colours_of(names: Sequence[str]) -> dict[str, str]:
