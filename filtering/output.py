@@ -4,7 +4,6 @@ import platform
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -112,7 +111,8 @@ def write_filter_output(
             demos=demo_views(pool, fitted, folder, embed=embed, workers=workers),
             threshold=fitted.threshold_,
             subtasks=fitted.segments_.subtasks,
-            sections=[*([_words_section(fitted)] if fitted.words_ else []), *sections],
+            words=fitted.words_,
+            sections=sections,
             unit=Clock(pool.fps).unit,
         )
     except Exception as error:
@@ -192,12 +192,6 @@ def _sequences_record(fitted: DemoFilter) -> list[dict[str, Any]] | None:
         {"steps": list(way.steps), "demonstrations": [names[row] for row in way.rows]}
         for way in fitted.summary_.ways.all
     ]
-
-
-def _words_section(fitted: DemoFilter) -> ReportSection:
-    """Return the part of the page that says what holds for the pool as a whole."""
-    items = "".join(f"<li>{escape(words)}</li>" for words in fitted.words_)
-    return ReportSection("The pool as a whole", f"<ul>{items}</ul>")
 
 
 def _by_demo(fitted: DemoFilter, values: NDArray[np.float64]) -> dict[str, float]:

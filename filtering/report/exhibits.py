@@ -58,7 +58,7 @@ def exhibits_of(pool: Source, fitted: DemoFilter, demo: int) -> tuple[Exhibit, .
 
 def _exhibit(pool: Source, fitted: DemoFilter, demo: int, finding: Finding) -> Exhibit:
     there = _elsewhere(fitted, demo, finding)
-    known = finding.ineffective or finding.came
+    known = finding.ineffective or finding.came or finding.extra
     stretch = known or _around(pool, demo, finding.frame, there[1] if there else None)
     both = finding.ineffective is not None
     own = _excerpt(pool, demo, stretch, both=both, at=None if known else finding.frame)
@@ -70,6 +70,8 @@ def _elsewhere(fitted: DemoFilter, demo: int, finding: Finding) -> tuple[int, Sp
     """Return which demonstration shows what was expected, and where."""
     if finding.counterpart is not None:
         return finding.counterpart.demo, finding.counterpart.span
+    if finding.extra is not None:
+        return None  # nothing is expected
     spans = fitted.segments_.spans
     for other in _by_trust(fitted):
         if other == demo or not spans[other]:

@@ -151,6 +151,7 @@ def render_report(
     subtasks: Sequence[str] = (),
     title: str = "Which demonstrations can be trusted?",
     summary: str = "",
+    words: Sequence[str] = (),
     sections: Sequence[ReportSection] = (),
     unit: str = "s",
 ) -> None:
@@ -163,6 +164,7 @@ def render_report(
         subtasks: names in the order of their colours; empty means in alphabetical order.
         title: heading of the page.
         summary: a line under the heading; empty means the number of flagged videos.
+        words: sentences about the pool as a whole.
         sections: further sections.
         unit: unit of times, s or frames.
 
@@ -178,6 +180,7 @@ def render_report(
         .render(
             title=title,
             summary=summary or _count_flagged(demos),
+            words=words,
             truth=_compared(demos),
             demos=ordered,
             threshold=threshold,

@@ -102,7 +102,7 @@ def _segments(spans: Iterable[Span], clock: Clock) -> tuple[Segment, ...]:
 def _exhibit_view(pool: Source, exhibit: Exhibit, films: Mapping[Key, Film]) -> ExhibitView:
     clock, finding = Clock(pool.fps), exhibit.finding
     where = f"expected at {clock.at(finding.frame)}"
-    if finding.ineffective is not None or finding.came is not None:
+    if finding.ineffective or finding.came or finding.extra:
         where = clock.during(exhibit.own.span)
     elif not finding.missing:
         where = f"from {clock.at(finding.frame)}"
@@ -165,6 +165,8 @@ def _brief(finding: Finding) -> str:
 def _words(finding: Finding) -> str:
     if finding.ineffective is not None:
         return f"{finding.ineffective.subtask} was ineffective"
+    if finding.extra is not None:
+        return f"{finding.extra.subtask} is extra"
     if finding.expected is None:
         return "the end was expected" if finding.counterpart is None else "few others show this"
     return f"{finding.expected} {'is missing' if finding.missing else 'expected'}"
