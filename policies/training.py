@@ -24,6 +24,7 @@ from policies.learners.registry import (
 )
 from policies.settings import TrainSettings
 from teasim.common.errors import ConfigError
+from teasim.common.figures import CurvesFigure, check_figures, save_figures
 from teasim.common.files import check_new_folder
 from teasim.common.workers import Workers
 from teasim.pool import Pool
@@ -94,6 +95,7 @@ def train(settings: TrainSettings) -> Training:
         ConfigError: a name is unknown, the table does not fit the pool, or the folder is in use.
         PoolError: the pool is missing or damaged.
     """
+    check_figures(settings.figures)
     kind = find_learner(settings.learner, settings.level)
     options = read_options(settings.learner, kind, parse_assignments(settings.learner_settings))
     demos = DemosConfig(observe=settings.observe, cameras=settings.camera)
@@ -119,6 +121,9 @@ def train(settings: TrainSettings) -> Training:
         "history": learner.history_,
     }
     save_policy(learner.policy_, settings.out, training=record)
+    if settings.figures is not None:
+        curve = CurvesFigure({settings.learner: tuple(map(float, learner.history_))})
+        save_figures(settings.figures, {"training": curve})
     return Training(
         policy=learner.policy_,
         out=settings.out,

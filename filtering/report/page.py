@@ -9,8 +9,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from filtering.report.colours import colours_of, ink_on
 from filtering.report.layout import Mark, place_marks, strip_of
+from teasim.common.colours import colours_of, ink_on
 from teasim.common.errors import TeasimError
 from teasim.common.files import write_text
 from teasim.pool.weight_table import COLUMNS

@@ -1,4 +1,4 @@
-"""Colours of sub-tasks, each with a text colour that can be read on it."""
+"""Colours of sub-tasks and other series, each with a text colour that can be read on it."""
 
 import colorsys
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ INKS = ("#000000", "#ffffff")
 
 
 def colours_of(names: Sequence[str]) -> dict[str, str]:
-    """Return a colour for each name, as #rrggbb."""
+    """Return a colour for each name in the order of names, as #rrggbb."""
     return {name: colour(number) for number, name in enumerate(names)}
 
 
