@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -12,6 +12,7 @@ from filtering.config import FilterConfig
 from filtering.segmentation.config import FitConfig
 from teasim.common.cli import parse
 from teasim.common.errors import ConfigError
+from teasim.common.figures import check_figures, save_figures
 from teasim.common.workers import WorkerOptions, Workers
 from teasim.pool.readers.reader import ReadOptions
 
@@ -51,6 +52,11 @@ class FilterCommand:
     """Where the work runs."""
     overwrite: bool = False
     """Replace the output of an earlier filter in the output folder."""
+    figures: Path | None = None
+    """Folder for figures as SVG and PNG; needs `pip install teasim[figures]`."""
+    embed: Literal["auto", "all", "none"] = "auto"
+    """Put the videos into report.html (all), or into the folder videos beside it (none). auto: into
+    the page if they have at most 12 MB."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError if `max_flagged` is not a share."""
@@ -68,6 +74,8 @@ class FitCommand:
     """New folder for the segmenter."""
     config: Annotated[FitConfig, tyro.conf.OmitArgPrefixes]
     """Settings of the fit."""
+    figures: Path | None = None
+    """Folder for figures as SVG and PNG; needs `pip install teasim[figures]`."""
     workers: WorkerOptions = field(default_factory=Workers)
     """Where the work runs."""
 
@@ -82,6 +90,8 @@ class PredictCommand:
     """The pool, or a folder with mapping.txt and features/*.npy."""
     out: Out
     """New folder for predictions, posteriors and, where the true labels are known, metrics.json."""
+    figures: Path | None = None
+    """Folder for figures as SVG and PNG; needs `pip install teasim[figures]`."""
     workers: WorkerOptions = field(default_factory=Workers)
     """Where the work runs."""
 
@@ -124,16 +134,25 @@ def segment(argv: Sequence[str] | None = None) -> int:
 def _filter(command: FilterCommand) -> int:
     from filtering.by_task import fit_by_task
     from filtering.output import check_output, write_filter_output
+    from filtering.report.figures import save_filter_figures
     from teasim.pool.readers.registry import open_source
     from teasim.pool.soundness import print_notes
 
+    check_figures(command.figures)
     pool = open_source(command.source, command.options)
     print_notes(pool)
     check_output(command.out, pool.root, overwrite=command.overwrite)
     fitted = fit_by_task(command.config, pool, workers=command.workers)
     write_filter_output(
-        command.out, pool, fitted, overwrite=command.overwrite, workers=command.workers
+        command.out,
+        pool,
+        fitted,
+        overwrite=command.overwrite,
+        embed=command.embed,
+        workers=command.workers,
     )
+    if command.figures is not None:
+        save_filter_figures(command.figures, pool, fitted)
     _print_result(pool, fitted)
     page = command.out / "report.html"
     print(f"report: {page}" if page.exists() else f"weights: {command.out / 'weights.csv'}")
@@ -177,6 +196,7 @@ def _fit(command: FitCommand) -> int:
     from filtering.segmentation.fit import fit_segmenter
     from filtering.segmentation.scoring import scores_table
 
+    check_figures(command.figures)
     result = fit_segmenter(command.pool, command.out, command.config, workers=command.workers)
     for name in result.never_shown:
         print(
@@ -186,16 +206,23 @@ def _fit(command: FitCommand) -> int:
         )
     numbers = ", ".join(map(str, result.labelled))
     print(f"fitted to {len(result.labelled)} demonstrations: {numbers}")
+    if command.figures is not None:
+        save_figures(command.figures, result.figures)
     print(scores_table(result.scores))
     print(f"segmenter: {command.out}")
     return 0
 
 
 def _predict(command: PredictCommand) -> int:
+    from filtering.segmentation.figures import folder_figures
     from filtering.segmentation.predict import predict
     from filtering.segmentation.scoring import scores_table
+    from teasim.pool.mstcn.folder import MSTCNFolder
 
+    check_figures(command.figures)
     scores = predict(command.segmenter, command.source, command.out, workers=command.workers)
+    if command.figures is not None:
+        save_figures(command.figures, folder_figures(MSTCNFolder.open(command.out)))
     print(scores_table(scores) if scores else "Nothing is scored: the true labels are not known.")
     print(f"predictions: {command.out / 'predictions'}")
     return 0

@@ -4,7 +4,6 @@ import platform
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from filtering.demo_filter import DemoFilter, caution
 from filtering.judging.explain import Clock
 from filtering.report import ReportSection, render_report
-from filtering.report.videos import FOLDER, foreign_videos, remove_videos
+from filtering.report.videos import FOLDER, Embed, foreign_videos, remove_videos
 from filtering.report.views import demo_views
 from filtering.segmentation.scoring import score_episodes, scores_json
 from teasim.common.errors import ConfigError, TeasimError
@@ -76,13 +75,12 @@ def write_filter_output(
     *,
     sections: Sequence[ReportSection] = (),
     overwrite: bool = False,
+    embed: Embed = "auto",
     workers: Workers = IN_PROCESS,
 ) -> None:
     """Write FILES to the folder `out`, each atomically, the page last.
 
-    Videos that are too large to embed in the page are in a folder `videos` beside it.
-
-    An error while the page is made becomes a warning on stderr: the results are already written.
+    Videos that are not embedded in the page are in a folder `videos` beside it. An error while the page is made becomes a warning on stderr: the results are already written.
 
     Args:
         out: new or empty folder, or one with an earlier output.
@@ -90,6 +88,7 @@ def write_filter_output(
         fitted: the filter after `fit(pool)`.
         sections: further sections of the page.
         overwrite: replace an earlier output.
+        embed: whether the page holds its videos: all, none, or auto, where they are small.
         workers: where the videos of the page are encoded.
 
     Raises:
@@ -107,10 +106,11 @@ def write_filter_output(
     try:
         render_report(
             folder / "report.html",
-            demos=demo_views(pool, fitted, folder, workers=workers),
+            demos=demo_views(pool, fitted, folder, embed=embed, workers=workers),
             threshold=fitted.threshold_,
             subtasks=fitted.segments_.subtasks,
-            sections=[*([_words_section(fitted)] if fitted.words_ else []), *sections],
+            words=fitted.words_,
+            sections=sections,
             unit=Clock(pool.fps).unit,
         )
     except Exception as error:
@@ -190,12 +190,6 @@ def _sequences_record(fitted: DemoFilter) -> list[dict[str, Any]] | None:
         {"steps": list(way.steps), "demonstrations": [names[row] for row in way.rows]}
         for way in fitted.summary_.ways.all
     ]
-
-
-def _words_section(fitted: DemoFilter) -> ReportSection:
-    """Return the part of the page that says what holds for the pool as a whole."""
-    items = "".join(f"<li>{escape(words)}</li>" for words in fitted.words_)
-    return ReportSection("The pool as a whole", f"<ul>{items}</ul>")
 
 
 def _by_demo(fitted: DemoFilter, values: NDArray[np.float64]) -> dict[str, float]:

@@ -128,6 +128,8 @@ class TrainSettings:
     """Folder of the policy that ppo trains further; default: it begins with nothing."""
     seed: int = 0
     """Seed of the learner."""
+    figures: Path | None = None
+    """Folder for figures as SVG and PNG; needs `pip install teasim[figures]`."""
     workers: WorkerOptions = field(default_factory=Workers)
     """Where the work runs."""
 
@@ -145,6 +147,8 @@ class AblateSettings:
     """TOML file that says what is varied; docs/policies.md shows one."""
     out: Out
     """Folder for the results; an unfinished ablation in it is resumed."""
+    figures: Path | None = None
+    """Folder for figures as SVG and PNG; needs `pip install teasim[figures]`."""
     workers: WorkerOptions = field(default_factory=Workers)
     """Where the work runs."""
 

@@ -24,6 +24,7 @@ from policies.learners.registry import (
 )
 from policies.settings import PPO_LEARNER, TrainSettings
 from teasim.common.errors import ConfigError
+from teasim.common.figures import CurvesFigure, check_figures, save_figures
 from teasim.common.files import check_new_folder
 from teasim.common.workers import Workers
 from teasim.pool import Pool
@@ -97,6 +98,7 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
         ConfigError: a name is unknown, the table does not fit the pool, or the folder is in use.
         PoolError: the pool is missing or damaged.
     """
+    check_figures(settings.figures)
     if settings.learner == PPO_LEARNER:
         from policies.reinforcement import reinforce  # loads stable-baselines3
 
@@ -130,6 +132,9 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
         "history": learner.history_,
     }
     save_policy(learner.policy_, settings.out, training=record)
+    if settings.figures is not None:
+        curve = CurvesFigure({settings.learner: tuple(map(float, learner.history_))})
+        save_figures(settings.figures, {"training": curve})
     return Training(
         policy=learner.policy_,
         out=settings.out,

@@ -40,6 +40,18 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class Counterpart:
+    """Where another demonstration shows what a finding is about."""
+
+    demo: int
+    """Position of that demonstration in the pool."""
+    span: Span
+    """Its frames."""
+    camera: str
+    """Camera that shows it best."""
+
+
+@dataclass(frozen=True)
 class Finding:
     """One unusual place in a demonstration."""
 
@@ -63,6 +75,8 @@ class Finding:
     """Segment of a step that few others carry out, or that often; else None."""
     rule: str = ""
     """Rule of the user that is broken here, in words; empty where the pool alone accuses."""
+    counterpart: Counterpart | None = None
+    """Where another demonstration shows it; None where the segments of its sub-task tell."""
 
 
 NO_STEP = "No single step stands out, but all steps together are less usual than most."

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.judging.explain import Clock, Finding
+from filtering.judging.explain import Clock, Counterpart, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.thresholds import Grouping, as_many_as_asked
 from filtering.moments.evidence import Stretch
@@ -123,6 +123,9 @@ def _finding(one: MomentFinding, counts: Sequence[int], timeline: Timeline) -> F
         surprise=one.surprise,
         came=own if one.kind == "order" else None,
         ineffective=own if one.kind == "ineffective" else None,
+        counterpart=Counterpart(
+            one.other.video, timeline.span(one.other, counts[one.other.video]), one.camera
+        ),
     )
 
 

@@ -1,7 +1,7 @@
 """Fitting a segmenter to labelled demonstrations of a pool (`teasim segment fit`)."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from filtering.features.checkpoint import save_features
 from filtering.features.learned import LookConfig, learn_features
 from filtering.segmentation.config import FitConfig
+from filtering.segmentation.figures import segmenter_figures
 from filtering.segmentation.mstcn.checkpoint import save_segmenter
 from filtering.segmentation.mstcn.segmenter import MSTCNSegmenter
 from filtering.segmentation.mstcn.training import LabelledVideo, MSTCNLearner, least_lengths
@@ -21,6 +22,7 @@ from filtering.vision.frame_features import FrameSource, frame_features, sampled
 from filtering.vision.frames import chosen_cameras, frame_rate
 from filtering.vision.pretrained import Backbone
 from teasim.common.errors import ConfigError, PoolError
+from teasim.common.figures import CurvesFigure, Drawing
 from teasim.common.files import check_new_folder
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.readers.registry import open_source
@@ -47,6 +49,8 @@ class FitResult:
     """Mean loss of the last epoch [nats, summed over stages]."""
     scores: ScoresByPart
     """Measures of the segmentation, by part of the pool."""
+    figures: Mapping[str, Drawing]
+    """Training, and confusion and timelines of the demonstrations that were evaluated."""
 
 
 def fit_segmenter(
@@ -73,11 +77,21 @@ def fit_segmenter(
     look = LookConfig(frames.cameras[0], backbone=network)
     learned = learn_features(chosen, subtasks, look, workers=workers) if config.features else None
     tried = [*chosen, *_draw(others, CHECKED, config.network.seed)]
+    found = segmenter.segment_episodes(pool, tried, workers=workers)
     result = FitResult(
         labelled=tuple(episode.index for episode in chosen),
         never_shown=tuple(sorted(_shown(others) - _shown(chosen))),
         loss=history[-1],
-        scores=score_episodes(tried, segmenter.segment_episodes(pool, tried, workers=workers)),
+        scores=score_episodes(tried, found),
+        figures={
+            "training": CurvesFigure({"loss": history}, "loss [nats, summed over stages]"),
+            **segmenter_figures(
+                [episode.name for episode in tried],
+                [episode.spans() for episode in tried],
+                found.spans,
+                pool.fps,
+            ),
+        },
     )
     record = _record(pool, config, result, history, time.perf_counter() - began)
     if learned is not None:

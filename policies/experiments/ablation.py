@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from policies.data.demos import DemosConfig
 from policies.experiments.ablation_config import AblationConfig
-from policies.experiments.ablation_tables import Cell, Detection, Found, write_results
+from policies.experiments.ablation_tables import (
+    Cell,
+    Detection,
+    Found,
+    ablation_figures,
+    write_results,
+)
 from policies.experiments.choosing import Chooser
 from policies.experiments.generating import generate_pool
 from policies.experiments.playing import AnyScores, play_cell, scores_from_json, scores_json
@@ -30,6 +36,7 @@ from policies.settings import AblateSettings, EnvironmentConfig
 from policies.training import LEVELS, places_of
 from teasim.common import parallel
 from teasim.common.errors import ConfigError
+from teasim.common.figures import check_figures, save_figures
 from teasim.common.files import check_new_folder, write_json
 from teasim.common.workers import Workers
 from teasim.pool import Pool
@@ -64,11 +71,15 @@ def run_ablation(settings: AblateSettings) -> str:
         ConfigError: the configuration is unusable, or the output folder is in use.
         PoolError: a pool is missing or damaged.
     """
-    return run_plan(AblationConfig.read(settings.config), settings.out, settings.workers)
+    config = AblationConfig.read(settings.config)
+    return run_plan(config, settings.out, settings.workers, settings.figures)
 
 
-def run_plan(config: AblationConfig, out: Path, workers: Workers) -> str:
-    """Run an ablation; see `run_ablation`."""
+def run_plan(
+    config: AblationConfig, out: Path, workers: Workers, figures: Path | None = None
+) -> str:
+    """Run an ablation and draw its figures, if there is a folder for them; see `run_ablation`."""
+    check_figures(figures)
     claim(config, out)
     report_resume(config, out)
     pools = [open_pool(variant, out, workers) for variant in config.pools]
@@ -81,7 +92,10 @@ def run_plan(config: AblationConfig, out: Path, workers: Workers) -> str:
     shares = [runs[first::count] for first in range(count)]
     work = partial(_run_all, config=config, out=out)
     parallel.run(work, shares, workers=workers, description="policies")
-    return write_results(config, results_of(config, choosers, out), out)
+    found = results_of(config, choosers, out)
+    if figures is not None:
+        save_figures(figures, ablation_figures(config, found))
+    return write_results(config, found, out)
 
 
 def results_of(config: AblationConfig, choosers: Sequence[Chooser], out: Path) -> Found:

@@ -1,4 +1,4 @@
-"""Results of an ablation: rows of cells and of filters, and tables of pooled training seeds."""
+"""Results of an ablation: rows of cells and of filters, tables and figures of pooled seeds."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,6 +11,8 @@ from policies.experiments.detection import DetectionScores, Judged, detection_sc
 from policies.experiments.playing import AnyScores, hits_by_scene, main_rate, merged
 from policies.experiments.tabular import html_page, html_table, markdown_table, write_rows
 from policies.play.evaluation import MODES, Scores
+from teasim.common.figures import AccuracyFigure, Drawing
+from teasim.common.figures.accuracy import Point
 from teasim.common.files import write_text
 from teasim.common.statistics import Rate, bootstrap_difference, rate
 
@@ -216,3 +218,49 @@ def _spread(rates: Mapping[str, Rate | None]) -> dict[str, float | None]:
 def _violation(scores: AnyScores, kind: str) -> Rate:
     """Rate of a kind of violation; 0 where it never occurred and the environment names none."""
     return scores.violations.get(kind) or rate(0, len(scores.episodes))
+
+
+def ablation_figures(config: AblationConfig, found: Found) -> dict[str, Drawing]:
+    """Return a figure per mode; none where no pool has labels, because K is not known then.
+
+    Pools with the same K and training seeds are pooled.
+    """
+    incorrect = {pool: sum(judged.wrong) for (pool, _), judged in found.detection.items()}
+    if not incorrect:
+        return {}
+    return {
+        f"accuracy_{mode}": AccuracyFigure(
+            {
+                _name(config, variant.name, learner.name): tuple(
+                    _point(config, found, (variant.name, learner.name, mode), k, incorrect)
+                    for k in sorted(set(incorrect.values()))
+                )
+                for variant in config.filters
+                for learner in config.learners
+            },
+            found.measure,
+        )
+        for mode in MODES
+    }
+
+
+def _name(config: AblationConfig, variant: str, learner: str) -> str:
+    return variant if len(config.learners) == 1 else f"{learner}, {variant}"
+
+
+def _point(
+    config: AblationConfig,
+    found: Found,
+    key: tuple[str, str, str],
+    k: int,
+    incorrect: dict[str, int],
+) -> Point:
+    variant, learner, mode = key
+    scores = [
+        found.cells[Cell(pool, variant, learner, seed)][mode]
+        for pool, number in incorrect.items()
+        if number == k
+        for seed in config.seeds
+    ]
+    rate = main_rate(merged(scores))
+    return Point(k, rate.value, rate.low, rate.high)

@@ -7,7 +7,8 @@ import pytest
 from filtering.demo_filter import DemoFilter
 from filtering.output import FILES, write_filter_output
 from filtering.report import DemoView, Mark, ReportSection, Segment, render_report
-from filtering.report.layout import place_dots, place_marks
+from filtering.report.layout import TALLEST, place_dots, place_marks, strip_of
+from teasim.common.colours import colours_of, contrast, ink_on
 from teasim.common.errors import ConfigError
 from teasim.pool import Pool, Span
 from teasim.pool.segments_table import read_segments_table
@@ -62,7 +63,10 @@ def _indexes(text: str) -> list[int]:
 def test_page_is_self_contained_and_sorted(written: Path) -> None:
     page = (written / "report.html").read_text()
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)
-    assert page.count("data:video/mp4;base64,") == 7
+    films = json.loads(page.split('id="films">')[1].split("</script>")[0])
+    assert {name for name in films if name.endswith("/left")} == {f"{n}/left" for n in range(7)}
+    assert {"2/cup", "5/cup"} <= set(films)
+    assert all(film.startswith("data:video/mp4;base64,") for film in films.values())
     shown = [int(number) for number in re.findall(r'id="demo-(\d+)"', page)]
     assert set(shown[:2]) == {2, 5}
     assert len(shown) == 7
@@ -113,6 +117,21 @@ def test_page_escapes_what_it_is_told(tmp_path: Path) -> None:
 def test_dots_never_cover_each_other() -> None:
     dots = place_dots([1.0, 1.0, 1.0, 0.99, 0.2])
     assert [dot.level for dot in dots] == [0, 1, 2, 3, 0]
+
+
+def test_many_dots_stand_in_columns_without_gaps() -> None:
+    strip = strip_of([0.9 + 0.0003 * number for number in range(300)])
+    assert strip.bars
+    columns = {dot.x: sorted(d.level for d in strip.dots if d.x == dot.x) for dot in strip.dots}
+    assert all(levels == list(range(len(levels))) for levels in columns.values())
+    assert strip.height <= TALLEST + 1e-9
+    assert not strip_of([0.5] * 8).bars
+
+
+def test_every_colour_has_a_text_colour_that_can_be_read() -> None:
+    names = [str(number) for number in range(200)]
+    assert all(contrast(ink_on(c), c) >= 4.5 for c in colours_of(names).values())
+    assert contrast("#ffffff", "#000000") == pytest.approx(21)
 
 
 def test_marks_that_are_close_stand_on_different_lines() -> None:

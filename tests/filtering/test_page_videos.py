@@ -1,17 +1,19 @@
 """Videos of the page: small, in time with the demonstration, embedded or beside the page."""
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from filtering.demo_filter import DemoFilter
 from filtering.output import FILES, write_filter_output
 from filtering.report import videos as module
-from filtering.report.videos import LONGER_SIDE, RATE, encode, page_videos
+from filtering.report.videos import LONGER_SIDE, RATE, Wanted, encode, page_films
 from teasim.common.errors import ConfigError
 from teasim.common.workers import IN_PROCESS
 from teasim.pool import Pool
@@ -70,38 +72,65 @@ def stored(tmp_path: Path) -> VideoClip:
 def test_a_small_stored_mp4_is_shown_as_it_is_and_a_large_one_is_not(
     stored: VideoClip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "EMBEDDED", 0)
     size = stored.path.stat().st_size
     for limit, same in ((size / 2 + 1, True), (size / 2 - 1, False)):
         monkeypatch.setattr(module, "STORED", limit)  # the video lasts two seconds
-        found = page_videos({7: stored}, 10.0, tmp_path, workers=IN_PROCESS)
-        assert found == {7: "videos/demo_000007.mp4"}
-        shown = (tmp_path / found[7]).read_bytes()
+        found = page_films({(7, 1): Wanted(stored, ())}, 10.0, tmp_path, "none", workers=IN_PROCESS)
+        assert found[7, 1].video == "videos/demo_000007_1.mp4"
+        shown = (tmp_path / found[7, 1].video).read_bytes()
         assert (shown == stored.path.read_bytes()) == same
         assert same or len(shown) < size
 
 
-def test_few_videos_are_embedded_and_leave_no_folder(stored: VideoClip, tmp_path: Path) -> None:
-    found = page_videos({0: stored, 1: stored}, 10.0, tmp_path, workers=IN_PROCESS)
-    assert all(address.startswith("data:video/mp4;base64,") for address in found.values())
-    assert not (tmp_path / "videos").exists()
+def test_few_videos_are_embedded_and_leave_no_folder(
+    stored: VideoClip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = {(number, 0): Wanted(stored, (0, 13)) for number in range(2)}
+
+    def films(embed: Any) -> list[str]:
+        found = page_films(wanted, 10.0, tmp_path, embed, workers=IN_PROCESS).values()
+        assert all(list(film.stills) == [0, 13] for film in found)
+        return [address for film in found for address in (film.video, *film.stills.values())]
+
+    def embedded(addresses: list[str]) -> bool:
+        inside = {address.startswith("data:") for address in addresses}
+        assert inside == {not (tmp_path / "videos").exists()}
+        return inside == {True}
+
+    assert embedded(films("auto"))
+    assert films("auto")[0].startswith("data:video/mp4;base64,")
+    assert films("auto")[1].startswith("data:image/jpeg;base64,")
+    assert not embedded(films("none"))
+    monkeypatch.setattr(module, "EMBEDDED", 0)
+    assert not embedded(films("auto"))
+    assert embedded(films("all"))
+
+
+def test_pictures_show_the_frames_that_were_asked_for(stored: VideoClip, tmp_path: Path) -> None:
+    found = page_films(
+        {(0, 0): Wanted(stored, (2, 19))}, 10.0, tmp_path, "none", workers=IN_PROCESS
+    )
+    for frame, address in found[0, 0].stills.items():
+        shown = cv2.cvtColor(cv2.imread(str(tmp_path / address)), cv2.COLOR_BGR2RGB)
+        assert shown.shape == (64, 64, 3)
+        (wanted,) = stored.frames([frame])
+        assert abs(shown.astype(float).mean() - wanted.astype(float).mean()) < 3
 
 
 def test_many_videos_are_linked_and_replaced_with_the_page(
-    toy_filter: DemoFilter, toy_pool: Pool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    toy_filter: DemoFilter, toy_pool: Pool, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
 
     def written(**options: Any) -> list[str]:
         write_filter_output(out, toy_pool, toy_filter, **options)
-        return re.findall(r'<video[^>]* src="([^"]{,30})', (out / "report.html").read_text())
+        return addresses(out / "report.html")
 
-    with monkeypatch.context() as patch:
-        patch.setattr(module, "EMBEDDED", 0)
-        links = written()
-        assert sorted(path.name for path in out.iterdir()) == sorted([*FILES, "videos"])
-        assert len(links) == len(set(links)) == len(toy_pool.episodes)
-        assert all(probe(out / link).n_frames for link in links)
+    links = written(embed="none")
+    assert sorted(path.name for path in out.iterdir()) == sorted([*FILES, "videos"])
+    flagged = int(toy_filter.flagged_.sum())
+    assert len(toy_pool.episodes) + flagged <= len(links) <= 2 * len(toy_pool.episodes)
+    assert all(probe(out / link).n_frames for link in links)
     (out / "videos" / "holiday.mp4").write_bytes(b"precious")
     with pytest.raises(ConfigError, match=r"holds other files \('videos/holiday.mp4'\)"):
         written(overwrite=True)
@@ -109,3 +138,10 @@ def test_many_videos_are_linked_and_replaced_with_the_page(
     (out / "videos" / "holiday.mp4").unlink()
     assert all(link.startswith("data:") for link in written(overwrite=True))
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
+
+
+def addresses(page: Path) -> list[str]:
+    """Addresses of the videos of a page."""
+    found = re.search(r'id="films">(.*?)</script>', page.read_text())
+    assert found is not None
+    return list(json.loads(found[1]).values())

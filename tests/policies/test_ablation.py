@@ -134,6 +134,16 @@ def refused(call):
     return str(error.value)
 
 
+def test_the_figures_of_a_finished_ablation_can_be_drawn(folder, done, tmp_path):
+    options = ["-o", str(done), "--jobs", "1", "--figures", str(tmp_path)]
+    assert ablate([str(folder / "plan.toml"), *options]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"accuracy_{mode}.{ending}"
+        for mode in ("deterministic", "sampled")
+        for ending in ("svg", "png")
+    }
+
+
 def test_a_folder_of_other_settings_is_left_alone(folder, done):
     other = folder / "other.toml"
     other.write_text((folder / "plan.toml").read_text().replace("episodes = 2", "episodes = 3"))

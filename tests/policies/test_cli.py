@@ -34,6 +34,13 @@ def try_out(run, *options):
     return evaluate([str(run), *fixed, *map(str, options)])
 
 
+def test_the_losses_of_training_can_be_drawn(fake_pool, tmp_path):
+    folder = tmp_path / "figures"
+    options = ["-o", str(tmp_path / "run"), "--jobs", "1", "--figures", str(folder)]
+    assert train([str(fake_pool.root), *options]) == 0
+    assert {path.name for path in folder.iterdir()} == {"training.svg", "training.png"}
+
+
 def test_a_policy_learns_the_fake_station_from_its_pool(run, tmp_path, capsys):
     json_file, junit = tmp_path / "s.json", tmp_path / "j.xml"
     code = try_out(run, "--min-policy-accuracy", 100, "--json", json_file, "--junit", junit)

@@ -101,7 +101,8 @@ def test_what_is_imported_is_what_is_declared():
     extras = PROJECT["optional-dependencies"]
     optional = {
         normal(Requirement(line).name)
-        for line in [*extras["dask"], *extras["ray"], *extras["hdf5"]]
+        for name in ("dask", "figures", "hdf5", "ray")
+        for line in extras[name]
     }
     declared = {normal(Requirement(line).name) for line in PROJECT["dependencies"]}
     owners = packages_distributions()

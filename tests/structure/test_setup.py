@@ -45,10 +45,10 @@ class Copy:
     root: Path
     environment: dict[str, str]
 
-    def setup(self, **environment: str) -> subprocess.CompletedProcess[str]:
+    def setup(self, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:
         """Run scripts/setup."""
         return subprocess.run(
-            ["scripts/setup"],
+            ["scripts/setup", *options],
             cwd=self.root,
             env=self.environment | environment,
             capture_output=True,
@@ -165,3 +165,42 @@ def test_without_a_python_it_says_so_in_one_sentence(copy):
         "setup: no Python 3.11 or newer with the venv module among no-such"
     )
     assert done.stderr.count("\n") == 1
+
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+@pytest.fixture
+def without_browser(copy, tmp_path) -> str:
+    """A PATH with all programs but browsers."""
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    for folder in reversed(copy.environment["PATH"].split(":")):
+        for found in Path(folder).glob("*"):
+            if found.name not in BROWSERS:
+                (programs / found.name).unlink(missing_ok=True)
+                (programs / found.name).symlink_to(found)
+    return str(programs)
+
+
+def test_a_browser_is_installed_only_when_asked_for_and_absent(copy, without_browser, tmp_path):
+    copy.setup(PATH=without_browser)
+    assert not any("chromium" in call for call in copy.calls())
+    done = copy.setup("--browser", PATH=without_browser)
+    assert done.returncode == 0
+    install = "apt-get install chromium -y --no-install-recommends"
+    assert copy.calls()[-2:] == ["apt-get update", install]
+    assert "setup: installing a browser: apt-get install chromium\n" in done.stdout
+    program(tmp_path / "programs/chromium", "")
+    copy.setup("--browser", PATH=without_browser)
+    assert copy.calls() == ["probe"]
+
+
+def test_without_a_browser_it_says_which_tests_are_skipped(copy, without_browser, tmp_path):
+    (tmp_path / "programs/apt-get").unlink()
+    done = copy.setup("--browser", PATH=without_browser)
+    assert done.returncode == 0
+    assert (
+        "setup: chromium cannot be installed; the tests of the report page in a browser are "
+        "skipped\n" in done.stdout
+    )

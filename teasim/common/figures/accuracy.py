@@ -1,0 +1,64 @@
+"""Accuracy of policies over K, the number of incorrect demonstrations (paper, figure 6)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from teasim.common.colours import colours_of
+
+SHIFT = 0.08
+"""Distance between the intervals of series at the same K, so that they do not cover each other."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A measured share with its interval."""
+
+    k: int
+    """Incorrect demonstrations in the pool."""
+    value: float
+    """Share in [0, 1]."""
+    low: float
+    """Lower end of its 95 % interval."""
+    high: float
+    """Upper end of its 95 % interval."""
+
+
+@dataclass(frozen=True)
+class AccuracyFigure:
+    """Series of shares over K."""
+
+    series: Mapping[str, tuple[Point, ...]]
+    """Points by name."""
+    measure: str = "policy accuracy"
+    """What is measured."""
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height [inches]."""
+        return 6.0, 3.4
+
+    def draw(self, axes: Any) -> None:
+        """Draw a line per series, with 95 % intervals."""
+        colours = colours_of(list(self.series))
+        for number, (name, points) in enumerate(self.series.items()):
+            points = tuple(sorted(points, key=lambda point: point.k))
+            shift = SHIFT * (number - (len(self.series) - 1) / 2)
+            values = [100 * point.value for point in points]
+            below = [100 * max(0.0, point.value - point.low) for point in points]
+            above = [100 * max(0.0, point.high - point.value) for point in points]
+            axes.errorbar(
+                [point.k + shift for point in points],
+                values,
+                (below, above),
+                marker="o",
+                markersize=4,
+                capsize=2,
+                linewidth=1.3,
+                color=colours[name],
+                label=name,
+            )
+        axes.grid(axis="y")
+        axes.set_xticks(sorted({p.k for points in self.series.values() for p in points}))
+        axes.set(xlabel="incorrect demonstrations K", ylabel=f"{self.measure} [%]", ylim=(0, 103))
+        axes.figure.legend(loc="outside upper center", ncols=min(3, len(self.series)))

@@ -1,0 +1,141 @@
+"""Headless Chromium, driven through a pipe by the Chrome DevTools protocol.
+
+https://chromedevtools.github.io/devtools-protocol/
+"""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+"""Programs that understand the protocol."""
+FLAGS = (
+    *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--mute-audio"),
+    *("--no-first-run", "--disable-extensions", "--disable-background-networking"),
+    *("--remote-debugging-pipe", "--hide-scrollbars", "--autoplay-policy=no-user-gesture-required"),
+)
+PATIENCE = 60.0
+"""Longest wait for an answer [s]; a machine may be busy."""
+
+
+def find_chromium() -> str | None:
+    """Path of a browser, None where there is none."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+class Browser:
+    """One tab of a browser."""
+
+    def __init__(self, process: subprocess.Popen[bytes], read: int, write: int) -> None:
+        self._process, self._read, self._write = process, read, write
+        self._buffer, self._count = b"", 0
+        self._session: str | None = None
+        self.errors: list[str] = []
+        target = self.send("Target.createTarget", url="about:blank")["targetId"]
+        attached = self.send("Target.attachToTarget", targetId=target, flatten=True)
+        self._session = attached["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.send(f"{domain}.enable")
+
+    def send(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Call a method of the protocol."""
+        self._count += 1
+        message = {"id": self._count, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._write, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._next()
+            if answer.get("id") == self._count:
+                assert "error" not in answer, answer
+                return dict(answer["result"])
+
+    def open(self, path: Path) -> None:
+        """Open a page and wait until its script has run."""
+        self.errors.clear()
+        self.send("Page.navigate", url=path.resolve().as_uri())
+        self.wait("document.documentElement?.dataset.ready !== undefined")
+
+    def run(self, script: str) -> Any:
+        """The value of a JavaScript expression."""
+        found = self.send(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
+        assert "exceptionDetails" not in found, found
+        return found["result"].get("value")
+
+    def wait(self, condition: str) -> None:
+        """Wait until an expression is true."""
+        self.until(lambda: bool(self.run(condition)), condition)
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        began = time.monotonic()
+        while not condition():
+            assert time.monotonic() - began < PATIENCE, f"never: {what}"
+            time.sleep(0.05)
+
+    def look(self, width: int, height: int, *, dark: bool = False) -> None:
+        """Set the size of the window and the scheme of colours."""
+        self.send(
+            "Emulation.setDeviceMetricsOverride",
+            **{"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
+        )
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.send("Emulation.setEmulatedMedia", features=[scheme])
+
+    def picture(self, path: Path) -> None:
+        """Save what the window shows as PNG."""
+        path.write_bytes(base64.b64decode(self.send("Page.captureScreenshot")["data"]))
+
+    def _next(self) -> dict[str, Any]:
+        while b"\0" not in self._buffer:
+            part = os.read(self._read, 1 << 20)
+            assert part, f"the browser ended with code {self._process.wait()}"
+            self._buffer += part
+        message, _, self._buffer = self._buffer.partition(b"\0")
+        found = dict(json.loads(message))
+        self._note(found.get("method"), found.get("params", {}))
+        return found
+
+    def _note(self, method: str | None, event: dict[str, Any]) -> None:
+        if method == "Runtime.exceptionThrown":
+            self.errors.append(json.dumps(event["exceptionDetails"]))
+        elif method == "Runtime.consoleAPICalled" and event["type"] in ("error", "warning"):
+            self.errors.append(json.dumps(event["args"]))
+        elif method == "Log.entryAdded" and event["entry"]["level"] in ("error", "warning"):
+            self.errors.append(json.dumps(event["entry"]))
+
+
+@contextmanager
+def browser(program: str, profile: Path) -> Iterator[Browser]:
+    """A browser with a profile of its own; it ends with the block."""
+    (child_in, write), (read, child_out) = os.pipe(), os.pipe()
+
+    def connect() -> None:  # the protocol's pipes are the descriptors 3 and 4
+        low, high = os.dup(child_in), os.dup(child_out)
+        os.dup2(low, 3)
+        os.dup2(high, 4)
+
+    process = subprocess.Popen(
+        [program, *FLAGS, f"--user-data-dir={profile}"],
+        close_fds=False,
+        preexec_fn=connect,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(child_in)
+    os.close(child_out)
+    try:
+        yield Browser(process, read, write)
+    finally:
+        os.close(write)
+        os.close(read)
+        process.terminate()
+        process.wait()
