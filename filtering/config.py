@@ -26,6 +26,8 @@ MOMENTS = "moments"
 """Name of the score that needs no segments."""
 COMBINED = "combined"
 """Name of the score of moments and the norm together."""
+CLUSTERING = "clustering"
+"""Name of the segmenter that needs videos alone."""
 AGREEMENT = "agreement"
 """Name of the segmenter that the score `moments` brings along."""
 
@@ -97,12 +99,12 @@ class FilterConfig(JudgingConfig):
         if score == AUTO and segmenter == AGREEMENT:
             score = MOMENTS
         elif score == AUTO:
-            alone = source.cameras and segmenter in (AUTO, "clustering") and self._is_plain
+            alone = source.cameras and segmenter in (AUTO, CLUSTERING) and self._is_plain
             score = COMBINED if alone else "norm"
         if segmenter == AUTO and score == MOMENTS:
             segmenter = AGREEMENT
         elif segmenter == AUTO and source.cameras:
-            segmenter = "clustering"
+            segmenter = CLUSTERING
         elif segmenter == AUTO:
             segmenter = "predictions" if source.has_predictions else "logged"
         return replace(self, score=score, segmenter=segmenter)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.config import AGREEMENT, COMBINED, MOMENTS, FilterConfig
+from filtering.config import AGREEMENT, CLUSTERING, COMBINED, MOMENTS, FilterConfig
 from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.features.config import POOLED
@@ -36,6 +36,7 @@ from teasim.pool.weight_table import WeightRow
 if TYPE_CHECKING:
     from filtering.judging.decision.decide import PoolDecision
     from filtering.moments.score import MomentScore
+    from filtering.moments.suitable import Comparable
 
 FEWEST_DEMOS = 3
 """Least number of demonstrations; fewer have no majority."""
@@ -57,6 +58,14 @@ def caution(count: int) -> str | None:
     return (
         f"With {count} demonstrations a majority is {count // 2 + 1}: a mistake that 2 of them "
         "share looks like usual behaviour, and even the mistake of a single one may not be flagged."
+    )
+
+
+def instead(usual: tuple[str, ...], used: tuple[str, ...]) -> str:
+    """Return a note that other cameras are used than usual."""
+    return (
+        f"The pictures of {', '.join(usual)} show nothing that the videos have in common; "
+        f"{', '.join(used)} is used instead."
     )
 
 
@@ -142,6 +151,7 @@ from the whole video.
         Raises:
             ConfigError: the pool has too few demonstrations, lacks a camera, or has no pictures
                 although a setting needs them.
+            UnsuitableError: nothing but videos is looked at, and they do not show one task.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
         self.timings_, self._notes = {}, tuple[str, ...]()
@@ -150,10 +160,8 @@ from the whole video.
         self.chosen_ = self.config.for_source(pool)
         self._knows_steps = self.chosen_.score != MOMENTS
         self.cameras_ = self._cameras(pool)
-        judges = {MOMENTS: self._by_moments, COMBINED: self._by_both}
-        judge = judges.get(self.chosen_.score, self._by_segments)
         self._seen: set[str] = set()
-        self._learn(judge(pool, workers), pool.fps)
+        self._learn(self._judge(pool, workers), pool.fps)
         self._sum_up()
         self.looked_at_ = tuple(camera for camera in pool.cameras if camera in self._seen)
         self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
@@ -200,38 +208,70 @@ from the whole video.
                 )
         return ()
 
-    def _by_both(self, pool: Source, workers: Workers) -> Judgement:
+    def _judge(self, pool: Source, workers: Workers) -> Judgement:
+        score = self.chosen_.score
+        if score not in (MOMENTS, COMBINED) and self.chosen_.segmenter != CLUSTERING:
+            return self._by_segments(pool, workers)
+        seen = self._compare(pool, workers)
+        if score == MOMENTS:
+            return self._by_moments(pool, seen, workers)
+        if score == COMBINED:
+            return self._by_both(pool, seen, workers)
+        return self._by_segments(pool, workers)
+
+    def _compare(self, pool: Source, workers: Workers) -> "Comparable":
+        """Look at the videos; leave out cameras that show nothing that the videos have in common.
+
+        Without a named camera the main one is used, or else the next one that is of use.
+        """
+        # Imported here because step lists need neither torch nor videos.
+        from filtering.moments.score import look
+        from filtering.moments.suitable import UnsuitableError, comparable
+
+        others = () if self.config.cameras else pool.cameras
+        trials = [chosen_cameras(pool, self.cameras_)]
+        trials += [(camera,) for camera in others if camera not in self.cameras_]
+        refusals: list[UnsuitableError] = []
+        for cameras in trials:
+            self._seen.update(cameras)
+            with self._timed("features"):
+                seen = look(pool, pool.episodes, cameras, workers=workers)
+            try:
+                with self._timed("moments"):
+                    found = comparable(seen)
+            except UnsuitableError as refusal:
+                refusals.append(refusal)
+                continue
+            self.cameras_ = tuple(found.videos)
+            self._notes = (instead(trials[0], cameras),) if refusals else found.notes
+            return found
+        raise refusals[0]
+
+    def _by_both(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:
         """Judge by sub-tasks and by moments; the graver verdict counts."""
         from filtering.judging.combined import CONFIRMED, combine, doubts
         from filtering.moments.confirmed import confirmation
-        from filtering.moments.suitable import FEWEST_MOMENTS
 
         by_segments = self._by_segments(pool, workers)
-        if self._shortest(pool) < FEWEST_MOMENTS:
-            self._notes = (TOO_SHORT,)
+        if not seen.found:
+            self._notes += (TOO_SHORT,)
             return self._cut(by_segments)
-        by_moments, score = self._moments(pool, workers)
+        by_moments, score = self._moments(pool, seen)
         found = list(score.counterparts.values())
         lengths = [episode.length for episode in pool.episodes]
         labels = labels_at(self.segments_, lengths, found[0].lengths)
         confirmed = max(confirmation(one, labels) for one in found)
-        self._notes = doubts(confirmed, score.one_order)
+        against = doubts(confirmed, score.one_order)
+        self._notes += against
         self._knows_steps = confirmed >= CONFIRMED
-        norm = None if self._notes else by_segments
+        norm = None if against else by_segments
         return self._cut(combine(norm, by_moments, pool.fps, self.config.groups))
 
-    @staticmethod
-    def _shortest(pool: Source) -> int:
-        """Return the moments of the shortest video."""
-        from filtering.moments.score import RATE
-
-        return int(min(episode.length for episode in pool.episodes) / frame_rate(pool) * RATE)
-
-    def _by_moments(self, pool: Source, workers: Workers) -> Judgement:
+    def _by_moments(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:
         """Judge by counterparts between the videos; segments only serve to show."""
         from filtering.segmentation.unlabelled.agreed import agreed_segments
 
-        judgement, score = self._moments(pool, workers, self.config.groups)
+        judgement, score = self._moments(pool, seen, self.config.groups)
         with self._timed("segments"):
             if self.chosen_.segmenter == AGREEMENT:
                 lengths = [episode.length for episode in pool.episodes]
@@ -241,15 +281,11 @@ from the whole video.
         return self._cut(judgement)
 
     def _moments(
-        self, pool: Source, workers: Workers, groups: str = "auto"
+        self, pool: Source, seen: "Comparable", groups: str = "auto"
     ) -> "tuple[Judgement, MomentScore]":
         # Imported here because step lists need neither torch nor videos.
         from filtering.judging.moments import Timeline, judge_moments
-        from filtering.moments.score import look
 
-        self._seen.update(self.cameras_)
-        with self._timed("features"):
-            seen = look(pool, pool.episodes, self.cameras_, workers=workers)
         episodes = pool.episodes
         timeline = Timeline([e.length for e in episodes], [e.name for e in episodes], pool.fps)
         with self._timed("moments"):
@@ -375,4 +411,4 @@ from the whole video.
     def _timed(self, stage: str) -> Iterator[None]:
         start = time.perf_counter()
         yield
-        self.timings_[stage] = time.perf_counter() - start
+        self.timings_[stage] = self.timings_.get(stage, 0.0) + time.perf_counter() - start

@@ -1,6 +1,6 @@
 """Judge a pool by moments of its videos: the score `moments` in the form of every other score."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +10,8 @@ from filtering.judging.explain import Clock, Counterpart, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.thresholds import Grouping, as_many_as_asked
 from filtering.moments.evidence import Stretch
-from filtering.moments.score import MomentFinding, MomentScore, score_moments
-from filtering.moments.vectors import Video
+from filtering.moments.score import MomentFinding, MomentScore, score_comparable
+from filtering.moments.suitable import Comparable
 from filtering.vision.frame_features import sampled_frames
 from teasim.pool import Span
 
@@ -52,23 +52,23 @@ class Timeline:
 
 
 def judge_moments(
-    cameras: Mapping[str, Sequence[Video]], timeline: Timeline, groups: str = "auto"
+    seen: Comparable, timeline: Timeline, groups: str = "auto"
 ) -> tuple[Judgement, MomentScore]:
     """Judge demonstrations by what cameras saw of them; no label is read.
 
     Args:
-        cameras: per camera the videos of the D demonstrations, see `filtering.moments.score.look`.
+        seen: what the cameras of use saw of the D demonstrations.
         timeline: their lengths and names.
         groups: how many groups there are, or auto.
 
     Raises:
-        ConfigError: moments cannot judge these videos, see `score_moments`; or there are fewer
-            demonstrations than groups.
+        ConfigError: the videos are too few or too short, or there are fewer demonstrations than
+            groups.
     """
-    score = score_moments(cameras)
+    score = score_comparable(seen)
     weights = 1 - score.probabilities
     grouping = as_many_as_asked(_by_nature(score), weights, groups)
-    counts = {camera: [len(video) for video in videos] for camera, videos in cameras.items()}
+    counts = {camera: [len(video) for video in videos] for camera, videos in seen.videos.items()}
     findings = tuple(
         tuple(_finding(one, counts[one.camera], timeline) for one in found)
         for found in score.findings

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.moments.cells import cell_pictures
-from filtering.moments.counterparts import Counterparts, find_counterparts
+from filtering.moments.counterparts import Counterparts
 from filtering.moments.decision import (
     KINDS,
     STEEPNESS,
@@ -31,16 +31,10 @@ from filtering.moments.evidence import (
     share_of_one_order,
     variety_of,
 )
-from filtering.moments.suitable import (
-    LEAST_RETURN,
-    check_videos,
-    sees_motion,
-    shared_structure,
-)
-from filtering.moments.vectors import Video, moment_vectors
+from filtering.moments.suitable import Comparable, check_videos, comparable
+from filtering.moments.vectors import Video
 from filtering.vision.frame_features import FrameSource, frame_features
 from filtering.vision.frames import frame_rate
-from teasim.common.errors import ConfigError
 from teasim.common.workers import Workers
 from teasim.pool.source import Demonstration, Source
 
@@ -135,25 +129,21 @@ def score_moments(cameras: Mapping[str, Sequence[Video]]) -> MomentScore:
         ConfigError: there are fewer than three videos, they are too short, no camera sees anything
             happen, or the videos do not show one task.
     """
-    check_videos(dict(cameras))
-    moving = {camera: videos for camera, videos in cameras.items() if sees_motion(videos)}
-    if not moving:
-        raise ConfigError(
-            f"Nothing happens in the pictures of {', '.join(cameras)}; name a camera that sees "
-            "the task."
-        )
+    check_videos(cameras)
+    return score_comparable(comparable(cameras))
+
+
+def score_comparable(seen: Comparable) -> MomentScore:
+    """Judge demonstrations by what the cameras of use saw of them.
+
+    Raises:
+        ConfigError: there are fewer than three videos, or they are too short.
+    """
+    check_videos(seen.videos)
     # The matrices are small: more BLAS threads only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = {name: find_counterparts(moment_vectors(seen)) for name, seen in moving.items()}
-        structure = {camera: shared_structure(one) for camera, one in found.items()}
-        useful = {c: one for c, one in found.items() if structure[c] >= LEAST_RETURN}
-        if not useful:
-            raise ConfigError(
-                "These videos do not show one task: most of their moments have no counterpart in "
-                "the other videos; filter the videos of one task at a time."
-            )
-        views = {camera: observe(one, moving[camera]) for camera, one in useful.items()}
-        return _judged(useful, views, structure)
+        views = {camera: observe(one, seen.videos[camera]) for camera, one in seen.found.items()}
+        return _judged(seen.found, views, seen.structure)
 
 
 def gather(

@@ -1,11 +1,13 @@
-"""Whether moments can judge a pool at all; where they cannot, one sentence says why."""
+"""Whether a pool can be judged from its videos at all; where it cannot, one sentence says why."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.moments.counterparts import ROUND_TRIP, Counterparts
-from filtering.moments.vectors import Video
+from filtering.moments.counterparts import ROUND_TRIP, Counterparts, find_counterparts
+from filtering.moments.vectors import Video, moment_vectors
 from teasim.common.errors import ConfigError
 
 FEWEST_VIDEOS = 3
@@ -21,7 +23,65 @@ pair of videos. On the scenes tabletop, hands and conveyor it is 0.9 or more, bu
 are carried in any order; of independent random walks it is 0.13 or less."""
 
 
-def check_videos(cameras: dict[str, Sequence[Video]]) -> None:
+class UnsuitableError(ConfigError):
+    """Videos that show nothing to judge, whatever the settings are."""
+
+
+@dataclass(frozen=True)
+class Comparable:
+    """What the cameras that are of use saw, and what it has in common."""
+
+    videos: Mapping[str, Sequence[Video]]
+    """Per camera of use the videos of the demonstrations."""
+    found: Mapping[str, Counterparts]
+    """Per camera of use the counterparts; empty where a video is too short to tell."""
+    structure: Mapping[str, float]
+    """Per camera that sees something happen, `shared_structure`; empty likewise."""
+    notes: tuple[str, ...] = ()
+    """A sentence about each camera that is left out."""
+
+
+def comparable(cameras: Mapping[str, Sequence[Video]]) -> Comparable:
+    """Leave out cameras that see nothing, or nothing that the videos have in common.
+
+    Args:
+        cameras: per camera the videos of the demonstrations.
+
+    Raises:
+        UnsuitableError: no camera sees anything happen, or the videos do not show one task.
+    """
+    moving = {camera: videos for camera, videos in cameras.items() if sees_motion(videos)}
+    if not moving:
+        raise UnsuitableError(
+            f"Nothing happens in the pictures of {', '.join(cameras)}; name a camera that sees "
+            "the task."
+        )
+    notes = tuple(
+        f"Nothing happens in the pictures of {camera}, which is left out."
+        for camera in cameras
+        if camera not in moving
+    )
+    if min(len(video) for videos in moving.values() for video in videos) < FEWEST_MOMENTS:
+        return Comparable(moving, {}, {}, notes)
+    # The matrices are small: more BLAS threads only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = {name: find_counterparts(moment_vectors(seen)) for name, seen in moving.items()}
+        structure = {camera: shared_structure(one) for camera, one in found.items()}
+    useful = {c: one for c, one in found.items() if structure[c] >= LEAST_RETURN}
+    if not useful:
+        raise UnsuitableError(
+            "These videos do not show one task: most of their moments have no counterpart in "
+            "the other videos; filter the videos of one task at a time."
+        )
+    notes += tuple(
+        f"The pictures of {camera} have little in common, and are left out."
+        for camera in found
+        if camera not in useful
+    )
+    return Comparable({c: moving[c] for c in useful}, useful, structure, notes)
+
+
+def check_videos(cameras: Mapping[str, Sequence[Video]]) -> None:
     """Refuse too few or too short videos.
 
     Args:

@@ -9,6 +9,7 @@ from filtering.moments.effects import states_of, usual_change
 from filtering.moments.evidence import moved, peak, worst
 from filtering.moments.replaced import Side, replaced
 from filtering.moments.score import score_moments
+from filtering.moments.suitable import comparable
 from filtering.moments.vectors import Video, moment_vectors
 from filtering.moments.windows import PACES, window_distances
 from teasim.common.errors import ConfigError
@@ -139,7 +140,7 @@ def test_a_camera_that_sees_nothing_changes_nothing(with_a_step_missing):
 def test_a_verdict_says_where_it_is_seen():
     videos = [*usual_videos(7), toy_video(MISSING, 50)]
     timeline = Timeline([2 * len(v) for v in videos], [f"video {n}" for n in range(8)], 10.0)
-    found, _ = judge_moments({"front": videos}, timeline)
+    found, _ = judge_moments(comparable({"front": videos}), timeline)
     assert found.grouping.flagged.tolist() == [False] * 7 + [True]
     assert found.reasons is not None
     assert "video" in found.reasons[7]
