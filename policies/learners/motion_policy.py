@@ -15,8 +15,17 @@ from policies.data.samples import Observation, RecurrentState, TrainedPolicy
 from policies.learners.store import DemonstrationStore
 
 
-class MotionPolicy(TrainedPolicy):
+class JointPolicy(TrainedPolicy):
+    """Common part of the policies that choose joint targets; subclasses implement `predict`."""
+
+    draws = False
+    """Whether sampled decisions differ from deterministic ones."""
+
+
+class MotionPolicy(JointPolicy):
     """Chooses joint targets; called like `policies.data.samples.Policy`."""
+
+    draws = True
 
     network: DemonstrationStore
 
