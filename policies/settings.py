@@ -96,7 +96,7 @@ class TrainSettings:
     """New folder for the policy."""
     learner: str = "bc"
     """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (robust to incorrect
-    demonstrations); nearest at the level joint."""
+    demonstrations); act (chunks), bc, bc-rnn or nearest at the level joint."""
     learner_settings: Assignments = ()
     """Setting of the learner, for example --set hidden=400; an unknown name lists the choices."""
     level: str = "subtask"

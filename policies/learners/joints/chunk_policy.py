@@ -56,7 +56,7 @@ class ChunkPolicy(JointPolicy):
         keep = self.network.ensemble * mass
         plan = (newest + keep[..., None] * plan) / (1 + keep)[..., None]
         targets = plan[:, 0].copy()
-        commands = self._switch(newest[:, 0], targets)
+        commands = self._switch(plan[:, 0], targets)
         changed = (commands != last) & np.isfinite(last)
         ages = np.where(changed, 1.0, np.minimum(ages + 1, OLDEST))
         following = _ahead(plan), _ahead(1 + keep), ages, commands, *hidden

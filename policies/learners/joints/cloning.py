@@ -36,7 +36,7 @@ def clone_chunks(
     def loss(_: int) -> Tensor:
         chosen = draws.batch()
         flat = chosen.ravel()
-        given = network.normaliser.inputs(torch.from_numpy(rows.given(flat)))
+        given = network.normaliser.inputs(torch.from_numpy(rows.given[flat]))
         wanted = torch.from_numpy(rows.planned(flat, config.chunk))
         planned = network(given.view(*chosen.shape, -1)).flatten(0, 1)
         missed = (planned - network.normaliser.targets(wanted)).abs().mean()
@@ -77,7 +77,7 @@ class Draws:
 def shape_for(rows: Rows, subtasks: int, config: PlanConfig) -> PlanShape:
     """Return the sizes of a network for `rows`."""
     return PlanShape(
-        inputs=rows.given(np.zeros(1, dtype=np.int64)).shape[1],
+        inputs=rows.given[np.zeros(1, dtype=np.int64]).shape[1],
         actions=rows.targets.shape[1],
         chunk=config.chunk,
         subtasks=subtasks,
@@ -90,7 +90,7 @@ def set_scales(network: PlanNetwork, rows: Rows, draws: Draws) -> None:
     """Set the normaliser and the values of the switches of `network` for `rows`."""
     size = draws.batch().size
     some = np.concatenate([draws.batch().ravel() for _ in range(1 + SCALED_ON // size)])
-    given, wanted = rows.given(some), rows.planned(some, network.shape.chunk)
+    given, wanted = rows.given[some], rows.planned(some, network.shape.chunk)
     network.normaliser.fit(given, wanted, rows.switches)
     for place, values in rows.values.items():
         network.values[place, : len(values)] = torch.from_numpy(values)

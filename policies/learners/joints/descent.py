@@ -24,9 +24,9 @@ RECORDS = 200
 class PlanConfig:
     """Settings that the learners of joint targets share."""
 
-    chunk: int = 16
+    chunk: int = 10
     """K, control steps (0.1 s) planned ahead."""
-    ensemble: float = 0.5
+    ensemble: float = 0.8
     """Weight of the plan of the step before in the joined plan; 0: only the newest plan counts."""
     batch: int = 64
     """Control steps per sub-task in a gradient step."""

@@ -20,10 +20,10 @@ OF_HANDS = "_hand"
 class Rows:
     """The steps to learn from, one demonstration after the other, without rests."""
 
-    low_dim: NDArray[np.float32]
-    """What was seen.  # (n, S)"""
-    ages: NDArray[np.float32]
-    """Control steps since each switch changed.  # (n, G)"""
+    given: NDArray[np.float32]
+    """Inputs; those that fade after a change of a switch come last.  # (n, I)"""
+    measured: NDArray[np.float32]
+    """Measured positions that targets are relative to; 0 for switches.  # (n, J)"""
     targets: NDArray[np.float32]
     """Joint targets [rad; m for grippers].  # (n, J)"""
     subtasks: NDArray[np.int64]
@@ -34,11 +34,6 @@ class Rows:
     """Share of the total weight of each demonstration.  # (D,)"""
     values: dict[int, NDArray[np.float32]]
     """Values of each switch by its place among the targets."""
-    inputs: StateInputs
-    """Turns what was seen into inputs."""
-    timed: bool
-    """Whether inputs tell how long ago the switches changed."""
-
     @property
     def switches(self) -> list[int]:
         """Places of the switches."""
@@ -49,11 +44,6 @@ class Rows:
         """First row of each demonstration, (D,)."""
         return np.append(0, self.stops[:-1])
 
-    def given(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return the inputs (n, I) at `rows`; those that fade after a change come last."""
-        seen = self.inputs(self.low_dim[rows])
-        return np.hstack([seen, age_inputs(self.ages[rows])]) if self.timed else seen
-
     def planned(self, rows: NDArray[np.int64], chunk: int) -> NDArray[np.float32]:
         """Return the next `chunk` targets (n, K, J) from `rows`, relative to measured positions.
 
@@ -61,10 +51,7 @@ class Rows:
         """
         last = self.stops[np.searchsorted(self.stops, rows, side="right")] - 1
         ahead = np.minimum(rows[:, None] + np.arange(chunk), last[:, None])
-        targets = self.targets[ahead]
-        measured = self.low_dim[rows, None, : targets.shape[2]].copy()
-        measured[..., self.switches] = 0
-        return np.asarray(targets - measured)
+        return np.asarray(self.targets[ahead] - self.measured[rows, None])
 
 
 def prepare(samples: MotionSamples, weights: NDArray[np.float64], *, timed: bool) -> Rows:
@@ -86,18 +73,31 @@ def prepare(samples: MotionSamples, weights: NDArray[np.float64], *, timed: bool
     joints = len(spec.state_names)
     world = [k for k, name in enumerate(names) if k >= joints and OF_HANDS not in name]
     kept = [_without_rests(demo, list(values), world) for demo in demos]
-    ages = [steps_since_change(demo.targets[:, list(values)]) for demo in kept]
+    inputs = StateInputs(names)
     return Rows(
-        low_dim=np.concatenate([demo.low_dim for demo in kept]),
-        ages=np.concatenate(ages),
+        given=np.concatenate([_given(demo, inputs, list(values), timed=timed) for demo in kept]),
+        measured=np.concatenate([_measured(demo, list(values)) for demo in kept]),
         targets=np.concatenate([demo.targets for demo in kept]),
         subtasks=np.concatenate([demo.subtasks for demo in kept]),
         stops=np.cumsum([len(demo.targets) for demo in kept]),
         shares=np.array([demo.share for demo in kept]),
         values=values,
-        inputs=StateInputs(names),
-        timed=timed,
     )
+
+
+def _given(
+    demo: MotionDemo, inputs: StateInputs, switches: list[int], *, timed: bool
+) -> NDArray[np.float32]:
+    seen = inputs(demo.low_dim)
+    if not timed:
+        return seen
+    return np.hstack([seen, age_inputs(steps_since_change(demo.targets[:, switches]))])
+
+
+def _measured(demo: MotionDemo, switches: list[int]) -> NDArray[np.float32]:
+    measured = demo.low_dim[:, : demo.targets.shape[1]].copy()
+    measured[:, switches] = 0
+    return measured
 
 
 def _without_rests(demo: MotionDemo, switches: list[int], world: Sequence[int]) -> MotionDemo:
