@@ -68,7 +68,7 @@ class JointBCRNN:
 
         def loss(_: int) -> Tensor:
             chosen, counts, before = windows.take()
-            given = torch.from_numpy(rows.given[chosen.ravel(])).view(*chosen.shape, -1)
+            given = torch.from_numpy(rows.given[chosen.ravel()]).view(*chosen.shape, -1)
             logits, planned, after = network(network.normaliser.inputs(given), before)
             windows.keep(after)
             wanted = torch.from_numpy(rows.planned(chosen.ravel(), config.chunk))

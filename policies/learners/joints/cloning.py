@@ -77,7 +77,7 @@ class Draws:
 def shape_for(rows: Rows, subtasks: int, config: PlanConfig) -> PlanShape:
     """Return the sizes of a network for `rows`."""
     return PlanShape(
-        inputs=rows.given[np.zeros(1, dtype=np.int64]).shape[1],
+        inputs=rows.given.shape[1],
         actions=rows.targets.shape[1],
         chunk=config.chunk,
         subtasks=subtasks,

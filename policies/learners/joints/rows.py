@@ -34,6 +34,7 @@ class Rows:
     """Share of the total weight of each demonstration.  # (D,)"""
     values: dict[int, NDArray[np.float32]]
     """Values of each switch by its place among the targets."""
+
     @property
     def switches(self) -> list[int]:
         """Places of the switches."""
