@@ -7,11 +7,11 @@ import torch
 from policies.data.motions import MotionSamples
 from policies.data.samples import ObservationSpec
 from policies.learners.joints.chunk_policy import ChunkPolicy
-from policies.learners.joints.inputs import NEAR, StateInputs
 from policies.learners.joints.networks import PlanShape
-from policies.learners.joints.rests import PRESSING, restless
-from policies.learners.joints.rows import prepare
-from policies.learners.joints.switches import OLDEST, steps_since_change, switch_values
+from policies.learners.joints.steps.inputs import NEAR, StateInputs
+from policies.learners.joints.steps.rests import PRESSING, restless
+from policies.learners.joints.steps.rows import prepare
+from policies.learners.joints.steps.switches import OLDEST, steps_since_change, switch_values
 from tests.policies.learning import kind_of
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")

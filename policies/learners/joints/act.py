@@ -16,7 +16,7 @@ from policies.data.motions import MotionSamples
 from policies.learners.joints.chunk_policy import ChunkPolicy
 from policies.learners.joints.cloning import clone_chunks
 from policies.learners.joints.descent import PlanConfig
-from policies.learners.joints.rows import prepare
+from policies.learners.joints.steps.rows import prepare
 
 
 @dataclass(frozen=True)

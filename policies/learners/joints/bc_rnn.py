@@ -20,7 +20,7 @@ from policies.learners.joints.cloning import Draws, set_scales, shape_for
 from policies.learners.joints.descent import PlanConfig, descend
 from policies.learners.joints.networks import HiddenState
 from policies.learners.joints.recurrent import RecurrentPlanNetwork
-from policies.learners.joints.rows import Rows, prepare
+from policies.learners.joints.steps.rows import Rows, prepare
 from teasim.common.errors import ConfigError
 
 

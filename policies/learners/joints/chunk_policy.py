@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from filtering.vision.determinism import one_thread
 from policies.data.motions import seen_numbers
 from policies.data.samples import Observation, ObservationSpec, RecurrentState
-from policies.learners.joints.inputs import StateInputs
 from policies.learners.joints.networks import PlanNetwork
-from policies.learners.joints.switches import OLDEST, age_inputs
+from policies.learners.joints.steps.inputs import StateInputs
+from policies.learners.joints.steps.switches import OLDEST, age_inputs
 from policies.learners.motion_policy import JointPolicy
 
 

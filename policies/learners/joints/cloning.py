@@ -8,7 +8,7 @@ from torch.nn.functional import cross_entropy
 
 from policies.learners.joints.descent import PlanConfig, descend
 from policies.learners.joints.networks import ChunkNetwork, PlanNetwork, PlanShape
-from policies.learners.joints.rows import Rows
+from policies.learners.joints.steps.rows import Rows
 
 EARLY_OR_LATE = 8
 """Control steps before and after a sub-task from which its network learns too, so that it knows
@@ -32,6 +32,8 @@ def clone_chunks(
     draws = Draws(rows, subtasks, config)
     network = ChunkNetwork(shape_for(rows, subtasks, config), config.seed, config.ensemble)
     set_scales(network, rows, draws)
+    if subtasks > 1:
+        network.relevant.copy_(torch.from_numpy(rows.relevant))
 
     def loss(_: int) -> Tensor:
         chosen = draws.batch()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.functional import gelu, layer_norm
 
-from policies.learners.joints.switches import MOST_VALUES
+from policies.learners.joints.steps.switches import MOST_VALUES
 
 INPUT_SCALE_FLOOR = 0.01
 """Least scale of an input [its unit]: less is the jitter of things at rest."""
@@ -153,6 +153,8 @@ class ChunkNetwork(nn.Module):
     kind: ClassVar[str] = "chunks"
     memory: ClassVar[tuple[int, ...]] = ()
     values: Tensor
+    relevant: Tensor
+    """1 for each input that the network of a sub-task is given, else 0.  # (E, I)"""
 
     def __init__(self, shape: PlanShape, seed: int, ensemble: float) -> None:
         """Draw the initial weights from a generator of their own, seeded with `seed`."""
@@ -162,6 +164,7 @@ class ChunkNetwork(nn.Module):
         self.normaliser = Normaliser(shape)
         self.register_buffer("values", torch.full((shape.actions, MOST_VALUES), torch.nan))
         sizes = shape.inputs, shape.width, shape.blocks, shape.chunk * shape.actions
+        self.register_buffer("relevant", torch.ones(shape.subtasks, shape.inputs))
         self.experts = Residual(shape.subtasks, sizes, random)
         self.teller = Residual(1, (shape.inputs, shape.width, 1, shape.subtasks), random)
 
@@ -180,7 +183,8 @@ class ChunkNetwork(nn.Module):
 
         With `members` (m,) only these sub-tasks are planned for, and E is m.
         """
-        planned: Tensor = self.experts(inputs, members)
+        relevant = self.relevant if members is None else self.relevant[members]
+        planned: Tensor = self.experts(inputs * relevant[:, None], members)
         return planned.view(*planned.shape[:2], self.shape.chunk, self.shape.actions)
 
     def plan(

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from policies.learners.joints.networks import HiddenState, Normaliser, PlanShape, Residual
-from policies.learners.joints.switches import MOST_VALUES
+from policies.learners.joints.steps.switches import MOST_VALUES
 
 
 class RecurrentPlanNetwork(nn.Module):

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from policies.data.motions import MotionDemo, MotionSamples, distinct_demos
 from policies.data.weighting import weigh
-from policies.learners.joints.inputs import StateInputs
-from policies.learners.joints.rests import restless
-from policies.learners.joints.switches import age_inputs, steps_since_change, switch_values
+from policies.learners.joints.steps.inputs import StateInputs
+from policies.learners.joints.steps.involved import involved_bodies, relevance
+from policies.learners.joints.steps.rests import restless
+from policies.learners.joints.steps.switches import age_inputs, steps_since_change, switch_values
 
 OF_HANDS = "_hand"
 """Part of the names of numbers of the environment that change when only the arms move."""
@@ -34,6 +35,8 @@ class Rows:
     """Share of the total weight of each demonstration.  # (D,)"""
     values: dict[int, NDArray[np.float32]]
     """Values of each switch by its place among the targets."""
+    relevant: NDArray[np.float32]
+    """1 for each input that matters for a sub-task, else 0.  # (E, I)"""
 
     @property
     def switches(self) -> list[int]:
@@ -75,14 +78,17 @@ def prepare(samples: MotionSamples, weights: NDArray[np.float64], *, timed: bool
     world = [k for k, name in enumerate(names) if k >= joints and OF_HANDS not in name]
     kept = [_without_rests(demo, list(values), world) for demo in demos]
     inputs = StateInputs(names)
+    given = np.concatenate([_given(demo, inputs, list(values), timed=timed) for demo in kept])
+    involved = involved_bodies(kept, names, 1 + max(int(demo.subtasks.max()) for demo in kept))
     return Rows(
-        given=np.concatenate([_given(demo, inputs, list(values), timed=timed) for demo in kept]),
+        given=given,
         measured=np.concatenate([_measured(demo, list(values)) for demo in kept]),
         targets=np.concatenate([demo.targets for demo in kept]),
         subtasks=np.concatenate([demo.subtasks for demo in kept]),
         stops=np.cumsum([len(demo.targets) for demo in kept]),
         shares=np.array([demo.share for demo in kept]),
         values=values,
+        relevant=relevance(inputs.sources, involved, given.shape[1] - inputs.count),
     )
 
 

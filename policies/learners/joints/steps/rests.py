@@ -9,7 +9,7 @@ besides the arms, as while a vessel runs empty, or soon after a gripper was comm
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.learners.joints.switches import steps_since_change
+from policies.learners.joints.steps.switches import steps_since_change
 
 STILL = 1e-4
 """Numbers of the state that change by less in a control step do not move [their unit]."""

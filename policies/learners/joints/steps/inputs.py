@@ -14,23 +14,40 @@ NEAR = 0.02
 """Distance at which the magnified position of a thing in a hand's frame saturates [m]."""
 RELATIVE = "_in_"
 """Part of the name of a pose that is relative to another body."""
-_QUATERNION = ("_qw", "_qx", "_qy", "_qz")
-_POSITION = ("_x", "_y", "_z")
+QUATERNION = ("_qw", "_qx", "_qy", "_qz")
+POSITION = ("_x", "_y", "_z")
+PARTS = (*POSITION, *QUATERNION)
+"""Ends of the names of the numbers of a pose."""
 
 
 class StateInputs:
-    """Turns states (n, S) into inputs (n, I) by the names of their numbers."""
+    """Turns states (n, S) into inputs (n, I) by the names of their numbers.
+
+    Poses in the world are left out of things that are also seen in the frame of a hand: they stay
+    the same while nothing touches the thing, so a network would tell by them which demonstration
+    it sees, and learn it by heart.
+    """
 
     def __init__(self, names: Sequence[str]) -> None:
         """Find poses among the S `names`: X_qw to X_qz, and X_x to X_z if X is relative."""
         places = {name: place for place, name in enumerate(names)}
-        turns = _groups(places, _QUATERNION)
-        near = [group for body, group in _groups(places, _POSITION).items() if RELATIVE in body]
+        seen_by_hand = {name.partition(RELATIVE)[0] for name in names if RELATIVE in name}
+        for thing in seen_by_hand:
+            for part in PARTS:
+                places.pop(thing + part, None)
+        turns = _groups(places, QUATERNION)
+        near = [group for body, group in _groups(places, POSITION).items() if RELATIVE in body]
         self._turns = np.array(list(turns.values()), dtype=np.int64).reshape(-1, 4)
         self._near = np.array(near, dtype=np.int64).reshape(-1)
-        self._plain = np.setdiff1d(np.arange(len(names)), self._turns)
-        self.count = len(self._plain) + 6 * len(self._turns) + len(self._near)
+        self._plain = np.setdiff1d(list(places.values()), self._turns).astype(np.int64)
+        sources = [*self._plain, *np.repeat(self._turns[:, 0], 6), *self._near]
+        self.sources = tuple(names[place] for place in sources)
+        """Name of the number, or of the first number of the quaternion, behind each input."""
+
+    @property
+    def count(self) -> int:
         """I, number of inputs."""
+        return len(self.sources)
 
     def __call__(self, seen: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the inputs (n, I) float32 of states (n, S)."""
