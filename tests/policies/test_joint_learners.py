@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import torch
 
-from policies.data.motions import MotionSamples
+from policies.data.motions import MotionDemo, MotionSamples
 from policies.data.samples import ObservationSpec
 from policies.learners.joints.chunk_policy import ChunkPolicy
 from policies.learners.joints.networks import PlanShape
 from policies.learners.joints.steps.inputs import NEAR, StateInputs
+from policies.learners.joints.steps.involved import involved_bodies, relevance
 from policies.learners.joints.steps.rests import PRESSING, restless
 from policies.learners.joints.steps.rows import prepare
 from policies.learners.joints.steps.switches import OLDEST, steps_since_change, switch_values
@@ -41,6 +42,38 @@ def test_a_position_in_a_hands_frame_is_magnified_near_the_hand():
     assert given.shape == (3, inputs.count) == (3, 3 + 6 + 3)
     assert given[2, -3] - given[0, -3] == pytest.approx(0.001 / NEAR, rel=0.01)
     assert given[0, -1] == pytest.approx(1)
+
+
+def test_places_in_the_world_are_left_out_where_a_hand_sees_the_thing():
+    names = [f"{body}_{part}" for body in ("cup", "cup_in_hand", "jug") for part in POSE]
+    inputs = StateInputs([*names, "cup_amount"])
+    assert {name for name in inputs.sources if not name.startswith("cup_in_hand")} == {
+        *(f"jug_{part}" for part in ("x", "y", "z", "qw")),
+        "cup_amount",
+    }
+
+
+def test_what_a_sub_task_involves_is_found_in_most_demonstrations():
+    """The cup is moved in sub-task 0, beside the jug; in sub-task 1 the knob is turned."""
+    names = [f"{body}_{part}" for body in ("cup", "jug", "pot", "hand", "foot") for part in "xyz"]
+    names += ["knob_angle", "knob_in_foot_qw"]
+    names += [f"{body}_in_hand_x" for body in ("cup", "jug", "pot")]
+    seen = np.zeros((10, len(names)), np.float32)
+    seen[:5, names.index("cup_x")] = seen[:5, names.index("hand_z")] = np.linspace(0, 0.2, 5)
+    seen[:, names.index("jug_x")] = 0.25
+    seen[:, names.index("pot_x")] = 0.5
+    seen[5:, names.index("knob_angle")] = np.linspace(0, 1, 5)
+    idle = np.zeros_like(seen)
+    tasks = np.repeat([0, 1], 5)
+    demos = [MotionDemo(array, array, tasks, share) for array, share in ((seen, 0.6), (idle, 0.4))]
+    involved = involved_bodies(demos, names, 3)
+    assert involved == [{"cup", "jug", "hand"}, {"knob"}, set()]
+    sources = ("elbow", "cup_in_hand_x", "pot_in_hand_qw", "cup_in_foot_x", "knob_in_foot_z")
+    assert relevance(sources, involved, 1).tolist() == [
+        [1, 1, 0, 0, 0, 1],
+        [1, 0, 0, 0, 0, 1],
+        [1, 1, 1, 1, 1, 1],
+    ]
 
 
 def test_a_target_of_few_values_is_a_switch():
