@@ -52,6 +52,8 @@ class PlanNetwork(Protocol):
     """Its sizes."""
     values: Tensor
     """Values of each switch, filled up with nan; all nan for other targets.  # (J, 16)"""
+    normaliser: "Normaliser"
+    """Scales of its inputs and targets."""
     ensemble: float
     """Weight of the plan of the step before in the joined plan."""
     memory: tuple[int, ...]
