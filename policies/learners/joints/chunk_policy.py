@@ -4,6 +4,8 @@ Its recurrent state is the joined plan, when each switch changed last, and what 
 remembers. It draws nothing, so sampled decisions equal deterministic ones.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -75,8 +77,11 @@ class ChunkPolicy(JointPolicy):
         )
 
     def _plan(
-        self, seen: NDArray[np.float32], ages: NDArray[np.float64], hidden: list[NDArray]
-    ) -> tuple[NDArray[np.float64], list[NDArray]]:
+        self,
+        seen: NDArray[np.float32],
+        ages: NDArray[np.floating],
+        hidden: Sequence[NDArray[np.floating]],
+    ) -> tuple[NDArray[np.floating], list[NDArray[np.floating]]]:
         """Return the newest plan (n, K, J) of absolute targets, and what the network remembers."""
         inputs = self._inputs(seen)
         if self.network.shape.inputs > inputs.shape[1]:
@@ -89,8 +94,8 @@ class ChunkPolicy(JointPolicy):
         return planned.numpy() + measured[:, None], [part.numpy() for part in after]
 
     def _switch(
-        self, newest: NDArray[np.float64], targets: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, newest: NDArray[np.floating], targets: NDArray[np.floating]
+    ) -> NDArray[np.floating]:
         """Set each switch in `targets` (n, J) to its value nearest to the plan; return them."""
         for place, values in self._values.items():
             nearest = np.abs(newest[:, place, None] - values).argmin(axis=1)
@@ -98,6 +103,6 @@ class ChunkPolicy(JointPolicy):
         return targets[:, list(self._values)]
 
 
-def _ahead(plan: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ahead(plan: NDArray[np.floating]) -> NDArray[np.floating]:
     """Return a plan (n, K, ...) one step later; nothing is known of its last step."""
     return np.concatenate([plan[:, 1:], np.zeros_like(plan[:, :1])], axis=1)

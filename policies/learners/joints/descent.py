@@ -88,7 +88,7 @@ def descend(
         for step in range(config.steps):
             optimizer.zero_grad()
             loss = losses(step)
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()
             nn.utils.clip_grad_norm_(parameters, LARGEST_GRADIENT)
             optimizer.step()
             schedule.step()
@@ -110,7 +110,7 @@ def _rate(step: int, steps: int) -> float:
     return 0.5 * (1 + float(np.cos(np.pi * (step - warm) / max(steps - warm, 1.0))))
 
 
-@torch.no_grad()  # type: ignore[untyped-decorator]
+@torch.no_grad()
 def _average(averaged: list[Tensor], parameters: list[nn.Parameter], keep: float) -> None:
     for mean, parameter in zip(averaged, parameters, strict=True):
         mean.lerp_(parameter, 1 - keep)

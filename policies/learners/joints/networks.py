@@ -56,8 +56,10 @@ class PlanNetwork(Protocol):
     """Scales of its inputs and targets."""
     ensemble: float
     """Weight of the plan of the step before in the joined plan."""
-    memory: tuple[int, ...]
-    """Sizes H of the parts of its hidden state."""
+
+    @property
+    def memory(self) -> tuple[int, ...]:
+        """Sizes H of the parts of its hidden state."""
 
     def plan(
         self, inputs: Tensor, subtasks: Tensor | None, hidden: HiddenState | None
@@ -153,7 +155,6 @@ class ChunkNetwork(nn.Module):
     """One residual network per sub-task plans a chunk; another tells the sub-task."""
 
     kind: ClassVar[str] = "chunks"
-    memory: ClassVar[tuple[int, ...]] = ()
     values: Tensor
     relevant: Tensor
     """1 for each input that the network of a sub-task is given, else 0.  # (E, I)"""
@@ -174,6 +175,11 @@ class ChunkNetwork(nn.Module):
     def settings(self) -> Mapping[str, float]:
         """Weight of earlier plans."""
         return {"ensemble": self.ensemble}
+
+    @property
+    def memory(self) -> tuple[int, ...]:
+        """It has no hidden state."""
+        return ()
 
     def tell(self, inputs: Tensor) -> Tensor:
         """Return logits of the sub-tasks (n, E) for normalised inputs (n, I)."""
