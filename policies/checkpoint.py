@@ -10,7 +10,10 @@ from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
 from policies.data.samples import ObservationSpec
-from policies.learners.motion_policy import MotionPolicy
+from policies.learners.joints.chunk_policy import ChunkPolicy
+from policies.learners.joints.networks import ChunkNetwork, PlanShape
+from policies.learners.joints.recurrent import RecurrentPlanNetwork
+from policies.learners.motion_policy import JointPolicy, MotionPolicy
 from policies.learners.networks import DecisionNetwork, Ensemble, NetworkShape, RecurrentNetwork
 from policies.learners.store import DemonstrationStore, StoreShape
 from policies.learners.subtask_policy import SubtaskPolicy
@@ -18,7 +21,7 @@ from teasim.common.checkpoint import CheckpointKind
 
 POLICY = CheckpointKind("policy", 2, held="trained policy", remedy="train again")
 
-AnyPolicy = SubtaskPolicy | MotionPolicy
+AnyPolicy = SubtaskPolicy | JointPolicy
 """A learned policy of either level."""
 
 
@@ -40,6 +43,10 @@ KINDS = {
         for network in (DecisionNetwork, Ensemble, RecurrentNetwork)
     },
     DemonstrationStore.kind: PolicyKind(DemonstrationStore, StoreShape, MotionPolicy),
+    **{
+        network.kind: PolicyKind(network, PlanShape, ChunkPolicy)
+        for network in (ChunkNetwork, RecurrentPlanNetwork)
+    },
 }
 """The networks a policy may have, by the name they are saved under."""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from policies.checkpoint import load_policy
-from policies.learners.motion_policy import MotionPolicy
+from policies.learners.motion_policy import JointPolicy
 from policies.learners.subtask_policy import SubtaskPolicy
 from policies.play.comparison import compare, comparison_json, comparison_text
 from policies.play.evaluation import evaluate_all
@@ -31,7 +31,7 @@ def run_evaluation(settings: EvaluateSettings) -> int:
     for path in (settings.json, settings.junit):
         check_file(path)
     policy = load_policy(settings.run)
-    if isinstance(policy, MotionPolicy):
+    if isinstance(policy, JointPolicy):
         return _evaluate_joints(policy, settings)
     return _evaluate_subtasks(policy, settings)
 
@@ -66,14 +66,14 @@ def _evaluate_subtasks(policy: SubtaskPolicy, settings: EvaluateSettings) -> int
 def _load_rival(run: Path) -> SubtaskPolicy:
     """Load a policy that a policy over sub-tasks can be compared with."""
     policy = load_policy(run)
-    if isinstance(policy, MotionPolicy):
+    if isinstance(policy, JointPolicy):
         raise ConfigError(
             f"'{run}' holds a policy of the joint level; a comparison needs two over sub-tasks."
         )
     return policy
 
 
-def _evaluate_joints(policy: MotionPolicy, settings: EvaluateSettings) -> int:
+def _evaluate_joints(policy: JointPolicy, settings: EvaluateSettings) -> int:
     asked = (settings.min_policy_accuracy, settings.against, settings.junit, settings.video)
     if any(option is not None for option in asked):
         raise ConfigError(

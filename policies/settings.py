@@ -101,7 +101,8 @@ class TrainSettings:
     """New folder for the policy."""
     learner: str = "bc"
     """Learner: bc, bc-rnn (with a memory), bcnd, demodice or r-maxent (robust to incorrect
-    demonstrations); nearest at the level joint; ppo (by reinforcement)."""
+    demonstrations); act (chunks), bc, bc-rnn or nearest at the level joint; ppo (by
+    reinforcement)."""
     learner_settings: Assignments = ()
     """Setting of the learner, for example --set hidden=400; an unknown name lists the choices."""
     level: str = "subtask"

@@ -1,7 +1,7 @@
 """Train a policy: a pool, a weight table and a learner's name become a policy on disk."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -33,6 +33,8 @@ from teasim.pool.soundness import print_notes, require_sound
 if TYPE_CHECKING:
     from policies.reinforcement import Reinforcement
 
+LOSSES = "losses.csv"
+"""File of the training losses in the folder of a policy."""
 RECORDED = ("learner", "level", "observe", "camera", "expert", "seed")
 """Settings that are stored with a policy as they were given."""
 
@@ -135,6 +137,7 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
     if settings.figures is not None:
         curve = CurvesFigure({settings.learner: tuple(map(float, learner.history_))})
         save_figures(settings.figures, {"training": curve})
+    write_losses(learner.history_, settings.out / LOSSES)
     return Training(
         policy=learner.policy_,
         out=settings.out,
@@ -145,6 +148,12 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
         loss=float(learner.history_[-1]),
         seconds=time.perf_counter() - began,
     )
+
+
+def write_losses(history: Sequence[float], path: Path) -> None:
+    """Write the training losses, one row each: number, loss."""
+    rows = "".join(f"{number},{loss:.6g}\n" for number, loss in enumerate(history, start=1))
+    path.write_text("number,loss\n" + rows, encoding="utf-8")
 
 
 def provide(kind: LearnerKind, pool: Pool, settings: TrainSettings) -> dict[str, Any]:

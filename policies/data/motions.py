@@ -3,6 +3,7 @@
 The joint level sees the state alone: joint positions, then the environment state.
 """
 
+import hashlib
 from dataclasses import dataclass
 from functools import partial
 
@@ -35,10 +36,12 @@ class MotionSamples:
     """What is seen."""
     action_names: tuple[str, ...]
     """Names of the J targets."""
+    labels: NDArray[np.int64] | None = None
+    """Sub-task that each step belongs to, an index; None: the pool names no sub-tasks.  # (n,)"""
 
     def __post_init__(self) -> None:
         """Check that the fields belong together and make the arrays read-only."""
-        arrays = (self.low_dim, self.targets, self.demos)
+        arrays = (self.low_dim, self.targets, self.demos, self.subtasks)
         if len({len(array) for array in arrays}) != 1:
             raise ValueError(f"fields differ in length: {[len(array) for array in arrays]}")
         if self.low_dim.shape[1:] != (self.spec.low_dim,):
@@ -50,11 +53,62 @@ class MotionSamples:
         for array in arrays:
             array.setflags(write=False)
 
+    @property
+    def subtasks(self) -> NDArray[np.int64]:
+        """Sub-task that each step belongs to, (n,); 0 where none are named."""
+        if self.labels is None:
+            return np.zeros(len(self.demos), dtype=np.int64)
+        return self.labels
+
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> "MotionSamples":
         """Return the steps at `rows` (indices, repeats allowed, or a mask)."""
         return MotionSamples(
-            self.low_dim[rows], self.targets[rows], self.demos[rows], self.spec, self.action_names
+            self.low_dim[rows],
+            self.targets[rows],
+            self.demos[rows],
+            self.spec,
+            self.action_names,
+            self.subtasks[rows],
         )
+
+
+@dataclass(frozen=True)
+class MotionDemo:
+    """The n control steps of one demonstration."""
+
+    low_dim: NDArray[np.float32]
+    """What was seen.  # (n, S)"""
+    targets: NDArray[np.float32]
+    """Joint targets.  # (n, J)"""
+    subtasks: NDArray[np.int64]
+    """Sub-task that each step belongs to.  # (n,)"""
+    share: float
+    """Share of the total weight."""
+
+    def take(self, rows: NDArray[np.bool_]) -> "MotionDemo":
+        """Return the steps where `rows` (n,) is true."""
+        return MotionDemo(self.low_dim[rows], self.targets[rows], self.subtasks[rows], self.share)
+
+
+def distinct_demos(samples: MotionSamples, shares: NDArray[np.float64]) -> list[MotionDemo]:
+    """Return every different demonstration of `samples`, with the share of the rows' `shares`.
+
+    They are sorted by a hash of their content, so the result does not depend on the order in the
+    pool, and a demonstration that occurs twice equals one of twice the weight.
+    """
+    found: dict[bytes, MotionDemo] = {}
+    for place in np.unique(samples.demos):
+        rows = samples.demos == place
+        parts = samples.low_dim[rows], samples.targets[rows], samples.subtasks[rows]
+        key = hashlib.sha256(b"".join(part.tobytes() for part in parts)).digest()
+        before = found[key].share if key in found else 0.0
+        # A demonstration counts by its weight, not by its length.
+        found[key] = MotionDemo(*parts, share=before + float(shares[rows].mean()))
+    total = sum(demo.share for demo in found.values())
+    return [
+        MotionDemo(demo.low_dim, demo.targets, demo.subtasks, demo.share / total)
+        for _, demo in sorted(found.items(), key=lambda pair: pair[0])
+    ]
 
 
 def load_motions(
@@ -73,12 +127,12 @@ def load_motions(
     check_log(pool)
     names = tuple(pool.state_names or ()), column_names(pool, ENVIRONMENT_STATE)
     spec, action_names = ObservationSpec((), 0, 0, *names), column_names(pool, ACTION)
-    read = partial(_read_demo, spec=spec)
+    read = partial(_read_demo, spec=spec, subtasks=pool.subtasks)
     demos = parallel.run(read, pool.episodes, workers=workers, description="motions")
-    low_dim, targets = (np.concatenate(parts) for parts in zip(*demos, strict=True))
-    places = np.repeat(np.arange(len(demos)), [len(steps) for _, steps in demos])
+    low_dim, targets, labels = (np.concatenate(parts) for parts in zip(*demos, strict=True))
+    places = np.repeat(np.arange(len(demos)), [len(steps) for _, steps, _ in demos])
     try:
-        return MotionSamples(low_dim, targets, places, spec, action_names)
+        return MotionSamples(low_dim, targets, places, spec, action_names, labels)
     except ValueError as error:
         raise PoolError(f"The joint log of '{pool.root}' is damaged: {error}.") from error
 
@@ -121,10 +175,14 @@ def check_log(pool: Pool) -> None:
 
 
 def _read_demo(
-    episode: Episode, *, spec: ObservationSpec
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Read one demonstration: states (n, S), targets (n, J)."""
+    episode: Episode, *, spec: ObservationSpec, subtasks: tuple[str, ...]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
+    """Read one demonstration: states (n, S), targets (n, J), sub-tasks (n,)."""
     observation = {"agent_pos": episode.column(STATE)}
     if spec.environment_names:
         observation["environment_state"] = episode.column(ENVIRONMENT_STATE)
-    return seen_numbers(observation, spec), episode.column(ACTION).astype(np.float32)
+    targets = episode.column(ACTION).astype(np.float32)
+    labels = np.zeros(len(targets), dtype=np.int64)
+    for span in episode.spans():
+        labels[span.start : span.stop] = subtasks.index(span.subtask)
+    return seen_numbers(observation, spec), targets, labels

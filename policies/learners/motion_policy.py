@@ -15,8 +15,30 @@ from policies.data.samples import Observation, RecurrentState, TrainedPolicy
 from policies.learners.store import DemonstrationStore
 
 
-class MotionPolicy(TrainedPolicy):
+class JointPolicy(TrainedPolicy):
+    """Common part of the policies that choose joint targets; subclasses implement `predict`."""
+
+    draws = False
+    """Whether sampled decisions differ from deterministic ones."""
+
+    def predict(
+        self,
+        observation: Observation,
+        state: RecurrentState | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.float32], RecurrentState | None]:
+        """Return joint targets [rad; m for grippers], (J,) for one observation, (n, J) for n.
+
+        `state` is None at the start of an episode; `episode_start` (n,) marks new episodes.
+        """
+        raise NotImplementedError
+
+
+class MotionPolicy(JointPolicy):
     """Chooses joint targets; called like `policies.data.samples.Policy`."""
+
+    draws = True
 
     network: DemonstrationStore
 

@@ -7,7 +7,6 @@ several: the mean of two good ways to reach for a cup may knock it over. Only th
 is fitted, so the policy can do only what a demonstration did from a similar state.
 """
 
-import hashlib
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Self
@@ -15,7 +14,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from policies.data.motions import MotionSamples
+from policies.data.motions import MotionSamples, distinct_demos
 from policies.data.weighting import weigh
 from policies.learners.motion_policy import MotionPolicy
 from policies.learners.store import DemonstrationStore, StoreShape
@@ -60,39 +59,18 @@ class Nearest:
             ConfigError: the weights do not fit the samples, or all are 0.
         """
         samples, shares = weigh(samples, weights)
-        demos = _different(samples, shares)
-        low_dim, targets = (np.concatenate([demo[n] for demo in demos]) for n in (0, 1))
-        stops = np.cumsum([len(demo[0]) for demo in demos])
+        demos = distinct_demos(samples, shares)
+        low_dim = np.concatenate([demo.low_dim for demo in demos])
+        targets = np.concatenate([demo.targets for demo in demos])
+        stops = np.cumsum([len(demo.targets) for demo in demos])
         shape = StoreShape(
             len(low_dim), low_dim.shape[1], targets.shape[1], len(stops), self.config.chunk
         )
         store = DemonstrationStore(shape)
-        store.keep(low_dim, targets, stops, np.array([demo[2] for demo in demos]))
+        store.keep(low_dim, targets, stops, np.array([demo.share for demo in demos]))
         self.policy_ = MotionPolicy(store, samples.spec, samples.action_names)
         self.history_ = (_difference(store),)
         return self
-
-
-Demo = tuple[NDArray[np.float32], NDArray[np.float32], float]
-"""States (n, S), targets (n, J) and share of a demonstration."""
-
-
-def _different(samples: MotionSamples, shares: NDArray[np.float64]) -> list[Demo]:
-    """Return states (n, S), targets (n, J) and share of every different demonstration.
-
-    They are sorted by a hash of their content, so the result does not depend on the order in the
-    pool, and a demonstration that occurs twice equals one of twice the weight.
-    """
-    found: dict[bytes, Demo] = {}
-    for demo in np.unique(samples.demos):
-        rows = samples.demos == demo
-        seen, targets = samples.low_dim[rows], samples.targets[rows]
-        key = hashlib.sha256(seen.tobytes() + targets.tobytes()).digest()
-        before = found[key][2] if key in found else 0.0
-        # A demonstration counts by its weight, not by its length.
-        found[key] = (seen, targets, before + float(shares[rows].mean()))
-    total = sum(share for _, _, share in found.values())
-    return [(seen, targets, share / total) for _, (seen, targets, share) in sorted(found.items())]
 
 
 def _difference(store: DemonstrationStore) -> float:

@@ -11,6 +11,9 @@ from policies.learners.bc import BC, BCConfig
 from policies.learners.bc_rnn import BCRNN, BCRNNConfig
 from policies.learners.bcnd import BCND, BCNDConfig
 from policies.learners.demodice import DemoDICE, DemoDICEConfig
+from policies.learners.joints.act import ACT, ACTConfig
+from policies.learners.joints.bc import JointBC, JointBCConfig
+from policies.learners.joints.bc_rnn import JointBCRNN, JointBCRNNConfig
 from policies.learners.nearest import Nearest, NearestConfig
 from policies.learners.r_maxent import RMaxEnt, RMaxEntConfig
 from teasim.common.errors import ConfigError
@@ -69,6 +72,7 @@ class LearnerKind:
 
 
 LEARNERS = {
+    "act": LearnerKind(ACT, ACTConfig, ("joint",), needs=(LOG,)),
     "bc": LearnerKind(BC, BCConfig, ("subtask",)),
     "bc-rnn": LearnerKind(BCRNN, BCRNNConfig, ("subtask",)),
     "bcnd": LearnerKind(BCND, BCNDConfig, ("subtask",)),
@@ -76,6 +80,12 @@ LEARNERS = {
     "nearest": LearnerKind(Nearest, NearestConfig, ("joint",), needs=(LOG,)),
     "r-maxent": LearnerKind(RMaxEnt, RMaxEntConfig, ("subtask",)),
 }
+
+AT_JOINTS = {
+    "bc": LearnerKind(JointBC, JointBCConfig, ("joint",), needs=(LOG,)),
+    "bc-rnn": LearnerKind(JointBCRNN, JointBCRNNConfig, ("joint",), needs=(LOG,)),
+}
+"""What is done at the joint level by learners that have a row for sub-tasks above."""
 
 
 def find_learner(name: str, level: str) -> LearnerKind:
@@ -85,6 +95,8 @@ def find_learner(name: str, level: str) -> LearnerKind:
         ConfigError: there is no such learner, or it does not learn at that level.
     """
     kind = named("learner", LEARNERS, name)
+    if level == "joint":
+        kind = AT_JOINTS.get(name, kind)
     if level not in kind.levels:
         raise ConfigError(
             f"The learner '{name}' has no level '{level}'; choose {', '.join(kind.levels)}."

@@ -10,7 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from filtering.vision.determinism import one_thread
-from policies.learners.motion_policy import MotionPolicy
+from policies.learners.motion_policy import JointPolicy
 from policies.play.environments import make_environment
 from policies.play.evaluation import MODES, batches
 from policies.play.joint_rollout import MotionEpisode, run_motion
@@ -47,7 +47,7 @@ class MotionScores(Outcomes):
 class MotionBatch:
     """Episodes that one worker runs one after the other."""
 
-    policy: MotionPolicy
+    policy: JointPolicy
     """The policy."""
     mode: str
     """`deterministic` or `sampled` decisions."""
@@ -58,25 +58,28 @@ class MotionBatch:
 
 
 def evaluate_motion(
-    policy: MotionPolicy, config: EvaluationConfig, *, workers: Workers = IN_PROCESS
+    policy: JointPolicy, config: EvaluationConfig, *, workers: Workers = IN_PROCESS
 ) -> dict[str, MotionScores]:
-    """Score `policy` in both modes; the result does not depend on `workers`.
+    """Score `policy` in each mode it has; the result does not depend on `workers`.
+
+    A policy that draws nothing has the deterministic mode alone.
 
     Raises:
         CheckpointError: the policy was trained for another environment.
         ConfigError: the environment cannot be made.
     """
     environment = config.environment.at_level("joint")
+    modes = MODES if policy.draws else MODES[:1]
     work = [
         MotionBatch(policy, mode, seeds, environment)
-        for mode in MODES
+        for mode in modes
         for seeds in batches(_seeds(config, mode))
     ]
     played = parallel.run(_play_batch, work, workers=workers, description="episodes")
     pairs = list(zip(work, played, strict=True))
     return {
         mode: score_motion(mode, [e for batch, part in pairs if batch.mode == mode for e in part])
-        for mode in MODES
+        for mode in modes
     }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from policies.learners.motion_policy import MotionPolicy
+from policies.learners.motion_policy import JointPolicy
 from policies.play.environments import reported
 from policies.play.outcomes import Played
 from teasim.common.errors import CheckpointError
@@ -33,7 +33,7 @@ class MotionEpisode(Played):
 
 
 def run_motion(
-    env: gym.Env[Any, Any], policy: MotionPolicy, seed: int, *, deterministic: bool
+    env: gym.Env[Any, Any], policy: JointPolicy, seed: int, *, deterministic: bool
 ) -> MotionEpisode:
     """Run `policy` until the goal, the time limit, or `PATIENCE` steps without a new sub-task.
 
@@ -60,7 +60,7 @@ def run_motion(
 
 
 def check_joints(
-    env: gym.Env[Any, Any], policy: MotionPolicy, observation: Mapping[str, Any]
+    env: gym.Env[Any, Any], policy: JointPolicy, observation: Mapping[str, Any]
 ) -> None:
     """Raise CheckpointError unless `policy` was trained for this environment."""
     controlled = env.action_space.shape

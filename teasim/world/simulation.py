@@ -12,6 +12,7 @@ from teasim.constants import (
     UPDATES_PER_CONTROL,
 )
 from teasim.world.bodies.embodiments import find_embodiment
+from teasim.world.bodies.hand_view import HandView, hand_view_names
 from teasim.world.bodies.person import Appearance, wear
 from teasim.world.control import Controller
 from teasim.world.events import Event, Recogniser
@@ -22,6 +23,7 @@ from teasim.world.station import FREE_BODIES, Layout, body_name, place, station_
 SETTLE_TIME = 0.8
 """Time in which objects come to rest before an episode starts [s]."""
 _UPDATE = PHYSICS_TIMESTEP * STEPS_PER_UPDATE
+_SEEN_BY_HANDS = (*FREE_BODIES, "knob")
 
 ENVIRONMENT_STATE_NAMES = (
     *(f"{body}_{part}" for body in FREE_BODIES for part in ("x", "y", "z", "qw", "qx", "qy", "qz")),
@@ -32,8 +34,11 @@ ENVIRONMENT_STATE_NAMES = (
     *(f"cup_{content}" for content in CONTENTS),
     "cup_tea",
     "cup_mixed",
+    *hand_view_names(_SEEN_BY_HANDS),
 )
-"""Names of the environment state: poses [m, wxyz], knob [m, rad], amounts [ml or g], shares."""
+"""Names of the environment state: poses in the world [m, wxyz], knob [m, rad], amounts [ml or g],
+shares, poses of both hands in the world, and poses of all things in the frames of the hands
+(`teasim.world.bodies.hand_view`) [m, wxyz]."""
 
 
 class Simulation:
@@ -58,6 +63,7 @@ class Simulation:
         free = [self.model.joint(body_name(name)).qposadr[0] for name in FREE_BODIES]
         self._knob = self.model.joint("knob").qposadr[0]
         self._knob_body = self.model.body("knob").id
+        self._hand_view = HandView(self.model, [body_name(name) for name in _SEEN_BY_HANDS])
         self._poses = (np.array(free)[:, None] + np.arange(7)).ravel()
         self._glow = [self.model.geom("plate").id, self.model.geom("pilot").id]
         self.target = np.zeros(2 * self.embodiment.width + 2)
@@ -162,7 +168,8 @@ class Simulation:
         liquids = self.liquids
         amounts = [*liquids.amounts.values(), *liquids.cup.values(), liquids.tea, liquids.mixed]
         rest = [*place[:2], self.data.qpos[self._knob], *amounts]
-        return np.concatenate([self.data.qpos[self._poses], rest]).astype(np.float32)
+        seen = self._hand_view.read(self.data)
+        return np.concatenate([self.data.qpos[self._poses], rest, seen]).astype(np.float32)
 
     def paint(self) -> None:
         """Update what pictures show: levels, puddles, limbs, and the glow of the hob."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from teasim.cli.main import main
+from teasim.envs.observations import observation_space, observe
 from teasim.generation import GenerateConfig, demo_rng, generate, making, recording
 from teasim.pool import Pool
 from teasim.pool.integrity import check_pool
@@ -13,7 +14,8 @@ from teasim.pool.leakage import CLUES, OF_PICTURES, leakage
 from teasim.pool.lerobot.identity import halves
 from teasim.rollout import demonstrate, replay
 from teasim.task.mistakes import Plan
-from teasim.world.simulation import Simulation
+from teasim.world.bodies.embodiments import YUMI
+from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 from tests.generation.test_pool import SHORT, digests
 from tests.pool.conftest import BIN
 from tests.toy_pool import SEQ_1, make_toy_pool
@@ -50,6 +52,21 @@ def test_without_video_the_logs_are_those_of_the_filmed_demonstration(pools):
         assert logged.column(name).tobytes() == filmed.column(name).tobytes()
     assert logged.spans() == filmed.spans()
     assert logged.record == filmed.record
+
+
+@pytest.mark.parametrize("name", ["logged", "disturbed"])
+def test_the_log_is_what_the_environment_shows(pools, name):
+    """The same numbers in the same order, to the bit."""
+    space = observation_space("state", YUMI.state_names, (), (64, 64))
+    episode, simulation = pools[name].episodes[0], Simulation()
+    noise = SIGMA if name == "disturbed" else 0.0
+    logged = [episode.column(column) for column in LOGS[:3]]
+    steps = replay(simulation, logged[1], demo_rng(3, 0), execution_noise=noise)
+    for number, _ in enumerate(steps):
+        seen = observe(space, simulation, None, ())
+        assert seen["agent_pos"].tobytes() == logged[0][number].tobytes()
+        assert seen["environment_state"].tobytes() == logged[2][number].tobytes()
+    assert pools[name].info["features"][LOGS[2]]["names"] == list(ENVIRONMENT_STATE_NAMES)
 
 
 def test_a_pool_without_video_is_sound_and_has_no_camera(pools, capsys):

@@ -3,22 +3,34 @@
 import numpy as np
 
 from policies.data.motions import MotionSamples
-from policies.learners.registry import LEARNERS
+from policies.learners.registry import AT_JOINTS, LEARNERS, find_learner
 
+SMALL = {"steps": 40, "width": 16, "blocks": 1, "batch": 8, "learning_rate": 1e-2}
 QUICK = {
+    "act": SMALL | {"chunk": 3},
+    "bc@joint": SMALL,
+    "bc-rnn@joint": SMALL | {"chunk": 2, "window": 4, "hidden": 8},
     "nearest": {"chunk": 3},
     "bcnd": {"members": 2, "rounds": 2},
     "demodice": {"experts": (0, 1), "ratio_steps": 60},
 }
 """Settings that make a law cheap to test; two demonstrations are experts where some are needed."""
 
+ROWS = (*LEARNERS, *(f"{name}@joint" for name in AT_JOINTS))
+"""Every learner; one that has a row for each level also as NAME@joint."""
 AT_SUBTASKS = [name for name, kind in LEARNERS.items() if "subtask" in kind.levels]
 """Learners that choose sub-tasks."""
 
 
-def make(name, **settings):
-    """The learner `name` with its quick settings and, before them, `settings`."""
-    return LEARNERS[name].make(**(QUICK.get(name, {}) | settings))
+def kind_of(row):
+    """The learner of `row`, at the level after @ or else at its only or first one."""
+    name, _, level = row.partition("@")
+    return find_learner(name, level or LEARNERS[name].levels[0])
+
+
+def make(row, **settings):
+    """The learner of `row` with its quick settings and, before them, `settings`."""
+    return kind_of(row).make(**(QUICK.get(row, {}) | settings))
 
 
 def replay(policy, samples):

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from policies.checkpoint import load_policy, save_policy
-from policies.learners.registry import LEARNERS
 from teasim.common.errors import CheckpointError
-from tests.policies.learning import make, replay
+from tests.policies.learning import ROWS, kind_of, make, replay
 
-EVERY = pytest.mark.parametrize("name", LEARNERS)
+EVERY = pytest.mark.parametrize("name", ROWS)
 
 
 @pytest.fixture
@@ -22,7 +21,7 @@ def run(samples, tmp_path):
 
 @EVERY
 def test_a_saved_policy_decides_as_before(name, samples, motions, tmp_path):
-    samples = motions if LEARNERS[name].levels == ("joint",) else samples
+    samples = motions if kind_of(name).levels == ("joint",) else samples
     policy = make(name).fit(samples, np.ones(5)).policy_
     save_policy(policy, tmp_path, training={})
     loaded = load_policy(tmp_path)

@@ -193,7 +193,10 @@ def test_a_folder_in_use_is_left_alone(fake_pool, tmp_path):
     ("options", "said"),
     [
         (["--learner", "sac"], f"Unknown learner 'sac'; choose {', '.join(LEARNERS)}."),
-        (["--level", "joint"], "The learner 'bc' has no level 'joint'; choose subtask."),
+        (
+            ["--learner", "bcnd", "--level", "joint"],
+            "The learner 'bcnd' has no level 'joint'; choose subtask.",
+        ),
         (["--use", "drop"], "Unknown use 'drop' of weights; choose discard, weight, ignore."),
         (
             ["--observe", "sound"],

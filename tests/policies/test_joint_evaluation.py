@@ -9,6 +9,7 @@ from policies.checkpoint import load_policy
 from policies.cli import evaluate, train
 from policies.data.samples import ObservationSpec
 from policies.play.environments import make_environment
+from policies.play.evaluation import MODES
 from policies.play.joint_evaluation import evaluate_motion, score_motion
 from policies.play.joint_rollout import PATIENCE, MotionEpisode, run_motion
 from policies.play.results import motion_summary
@@ -19,6 +20,7 @@ from teasim.common.workers import Workers
 from teasim.constants import SUBTASKS
 from tests.policies.fake_joints import FAKE_JOINTS, FAKE_JOINTS_ID
 from tests.policies.fakes import SEQ_1
+from tests.policies.learning import ROWS, kind_of
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +29,24 @@ def run(joint_pool, tmp_path_factory):
     options = ["--learner", "nearest", "--level", "joint", "-o", str(folder), "--jobs", "1"]
     assert train([str(joint_pool.root), *options]) == 0
     return folder
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if kind_of(row).levels == ("joint",)])
+def test_every_learner_of_joints_trains_saves_and_plays(row, joint_pool, tmp_path):
+    """Twice the same bits, from the command line to the episode."""
+    quick = {"steps": 30, "width": 16, "batch": 16} if row != "nearest" else {}
+    sets = [word for name, value in quick.items() for word in ("--set", f"{name}={value}")]
+    fixed = ["--learner", row.partition("@")[0], "--level", "joint", "--jobs", "1", *sets]
+    for folder in ("one", "two"):
+        assert train([str(joint_pool.root), *fixed, "-o", str(tmp_path / folder)]) == 0
+    names = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert names == ["losses.csv", "policy.json", "policy.safetensors"]
+    for name in names:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    config = EvaluationConfig(1, environment=FAKE_JOINTS)
+    played = [evaluate_motion(load_policy(tmp_path / name), config) for name in ("one", "two")]
+    assert played[0] == played[1]
+    assert set(played[0]) == set(MODES if row == "nearest" else MODES[:1])
 
 
 def try_out(run, *options):
@@ -66,6 +86,7 @@ def test_workers_change_nothing(run):
 class Still:
     """Holds all joints at 0."""
 
+    draws = False
     spec = ObservationSpec((), 0, 0, ("j",) * 16, ("f",) * 7)
     action_names = ("j",) * 16
 

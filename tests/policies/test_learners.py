@@ -8,21 +8,21 @@ import torch
 
 from policies.learners.registry import LEARNERS, find_learner
 from teasim.common.errors import ConfigError
-from tests.policies.learning import AT_SUBTASKS, make, replay
+from tests.policies.learning import AT_SUBTASKS, ROWS, kind_of, make, replay
 
-EVERY = pytest.mark.parametrize("name", LEARNERS)
+EVERY = pytest.mark.parametrize("name", ROWS)
 
 
 SEEDLESS = {"nearest", "r-maxent"}
 """Learners that draw nothing: every seed gives the same."""
-DESCENDING = pytest.mark.parametrize("name", [name for name in LEARNERS if name != "nearest"])
+DESCENDING = pytest.mark.parametrize("name", [name for name in ROWS if name != "nearest"])
 """Learners that lower a loss step by step; the nearest neighbour remembers."""
 
 
 @pytest.fixture
 def samples(name, samples, motions):
     """What the learner `name` is given: 5 demonstrations of 6 rows, the last of which errs."""
-    return motions if LEARNERS[name].levels == ("joint",) else samples
+    return motions if kind_of(name).levels == ("joint",) else samples
 
 
 def fit(name, samples, weights, seed=0):
@@ -139,8 +139,8 @@ def test_an_unknown_learner_or_level_names_the_choices():
         find_learner("cb", "subtask")
     assert str(error.value) == f"Unknown learner 'cb'; choose {', '.join(LEARNERS)}."
     with pytest.raises(ConfigError) as error:
-        find_learner("bc", "joint")
-    assert str(error.value) == "The learner 'bc' has no level 'joint'; choose subtask."
+        find_learner("bcnd", "joint")
+    assert str(error.value) == "The learner 'bcnd' has no level 'joint'; choose subtask."
     with pytest.raises(ConfigError) as error:
         find_learner("nearest", "subtask")
     assert str(error.value) == "The learner 'nearest' has no level 'subtask'; choose joint."
@@ -150,6 +150,12 @@ def test_an_unknown_learner_or_level_names_the_choices():
 def test_no_learner_starts_with_settings_that_cannot_train(name):
     with pytest.raises(ConfigError, match="steps >= 1"):
         make(name, steps=0)
+
+
+PLANS = (
+    "A learner of joint targets needs chunk >= 1, batch >= 1, 0 <= ensemble < 1 and emphasis > 0."
+)
+SIZES = "A learner of joint targets needs width >= 1, blocks >= 0 and 0 <= averaging < 1."
 
 
 @pytest.mark.parametrize(
@@ -162,6 +168,12 @@ def test_no_learner_starts_with_settings_that_cannot_train(name):
         ),
         ("bc", {"bottleneck": 0}, "bottleneck is 0; choose 1 or more."),
         ("bc-rnn", {"hidden": 0}, "bc-rnn needs hidden >= 1 and layers >= 1."),
+        ("act", {"chunk": 0}, PLANS),
+        ("act", {"ensemble": 1.0}, PLANS),
+        ("bc@joint", {"emphasis": 0.0}, PLANS),
+        ("act", {"averaging": 1.0}, SIZES),
+        ("bc-rnn@joint", {"width": 0}, SIZES),
+        ("bc-rnn@joint", {"window": 0}, "bc-rnn needs hidden >= 1 and window >= 1."),
         ("nearest", {"chunk": 0}, "chunk is 0; choose 1 or more."),
         ("bcnd", {"members": 0}, "bcnd needs members >= 1 and rounds >= 1."),
         ("demodice", {"gamma": 1.0}, "gamma is 1.0; choose more than 0 and less than 1."),
@@ -183,5 +195,5 @@ def test_no_learner_starts_with_settings_that_cannot_train(name):
 )
 def test_settings_that_cannot_train_are_refused(name, settings, sentence):
     with pytest.raises(ConfigError) as error:
-        LEARNERS[name].make(**settings)
+        kind_of(name).make(**settings)
     assert str(error.value) == sentence

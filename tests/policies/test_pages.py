@@ -9,7 +9,7 @@ import pytest
 
 from policies import cli
 from policies.experiments import ablation_config
-from policies.learners.registry import LEARNERS
+from policies.learners.registry import AT_JOINTS, LEARNERS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {name: (DOCS / name).read_text() for name in ("ci.md", "policies.md")}
@@ -41,17 +41,28 @@ def test_the_build_sets_a_bar_and_keeps_the_scores():
 
 def test_every_learner_is_in_both_tables():
     rows = re.findall(r"^\| `([a-z][\w-]*)` \|", PAGES["policies.md"], re.MULTILINE)
-    assert rows == [*LEARNERS, *LEARNERS]
+    joints = [name for name, kind in LEARNERS.items() if "joint" in kind.levels]
+    assert rows == [*LEARNERS, *LEARNERS, *sorted([*joints, *AT_JOINTS]), *AT_JOINTS]
 
 
 def test_the_settings_of_every_learner_are_on_the_page():
     table = PAGES["policies.md"].partition("## Settings of a learner")[2].partition("## Python")[0]
     rows = dict(re.findall(r"^\| `([\w-]+)` \| (.+) \|$", table, re.MULTILINE))
-    told = {
+    assert settings(rows) == {name: kind.options for name, kind in LEARNERS.items()}
+
+
+def settings(rows):
+    """Names of the settings of every learner, for the second columns of a table."""
+    return {
         name: tuple(row.replace("those of `bc`", rows["bc"]).split(", "))
         for name, row in rows.items()
     }
-    assert told == {name: kind.options for name, kind in LEARNERS.items()}
+
+
+def test_the_settings_at_the_joint_level_are_on_the_page():
+    table = PAGES["policies.md"].partition("| learner at the level `joint` |")[2]
+    rows = dict(re.findall(r"^\| `([\w-]+)` \| (.+) \|$", table, re.MULTILINE))
+    assert settings(rows) == {name: kind.options for name, kind in AT_JOINTS.items()}
 
 
 def test_the_plan_on_the_page_is_that_of_the_module():

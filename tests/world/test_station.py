@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teasim.constants import UPDATES_PER_CONTROL
+from teasim.constants import ARMS, UPDATES_PER_CONTROL
 from teasim.world.monitor import Monitor
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 from teasim.world.station import (
@@ -160,3 +160,27 @@ def test_states_are_new_arrays_of_what_their_names_say(simulation):
     state[:], joints[:] = 0, 0
     assert simulation.environment_state().any()
     assert simulation.joint_state().any()
+
+
+@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("thing", [*FREE_BODIES, "knob"])
+def test_a_hand_and_what_it_sees_of_a_thing_give_the_things_place(arm, thing):
+    simulation = Simulation()
+    simulation.reset(sample_layout(np.random.default_rng(4)))
+    named = dict(zip(ENVIRONMENT_STATE_NAMES, simulation.environment_state(), strict=True))
+
+    def read(pose):
+        numbers = np.array([named[f"{pose}_{part}"] for part in ("x", "y", "z")], dtype=float)
+        turn = np.array([named[f"{pose}_q{part}"] for part in "wxyz"], dtype=float)
+        assert turn[0] >= 0
+        assert np.linalg.norm(turn) == pytest.approx(1)
+        matrix = np.empty(9)
+        mujoco.mju_quat2Mat(matrix, turn)
+        return numbers, matrix.reshape(3, 3)
+
+    place, turn = read(f"{arm}_hand")
+    away, turned = read(f"{thing}_in_{arm}_hand")
+    body = simulation.data.body(body_name(thing))
+    np.testing.assert_allclose(place + turn @ away, body.xpos, atol=1e-5)
+    np.testing.assert_allclose(turn @ turned, body.xmat.reshape(3, 3), atol=1e-5)
+    np.testing.assert_allclose(place, simulation.data.site(f"{arm}_tcp").xpos, atol=1e-6)

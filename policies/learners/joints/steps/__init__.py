@@ -1,0 +1,1 @@
+"""Control steps of a pool as the networks of joint targets are given them."""
