@@ -399,7 +399,12 @@ from the whole video.
         warning = caution(len(self.weights_))
         by_steps = self.summary_.words if self.summary_ else ()
         if self.chosen_.score == COMBINED:  # moments may see more than the found sub-tasks
-            by_steps = tuple(f"By the found sub-tasks: {w[0].lower()}{w[1:]}" for w in by_steps)
+            by_steps = tuple(
+                words
+                if words.startswith("No majority")
+                else f"By the found sub-tasks: {words[0].lower()}{words[1:]}"
+                for words in by_steps
+            )
         self.words_ = (
             *self._notes,
             *decided,

@@ -30,7 +30,7 @@ from teasim.envs.transitions import (
     situations,
 )
 from teasim.world.liquids import CONTENTS
-from teasim.world.simulation import ENVIRONMENT_STATE_NAMES
+from teasim.world.simulation import STATION_STATE_NAMES
 from teasim.world.station import draw_layout
 
 FIRST_FIT, FIRST_CHECK = 500_000, 600_000
@@ -61,9 +61,9 @@ class Physics:
 
     def _moment(self, observation: dict[str, np.ndarray], info: dict[str, Any]) -> Moment:
         liquids = self._env.get_state().simulation.liquids
-        things = observation["environment_state"].astype(np.float64)
+        things = observation["environment_state"][: len(STATION_STATE_NAMES)].astype(np.float64)
         for name in ("tea", "mixed"):  # float32 would round what is missing
-            things[ENVIRONMENT_STATE_NAMES.index(f"cup_{name}")] = liquids[name]
+            things[STATION_STATE_NAMES.index(f"cup_{name}")] = liquids[name]
         spilled = np.array([liquids["spilled"][content] for content in CONTENTS])
         time = float(info["time"])
         return Moment(observation["agent_pos"], things, spilled, info["subtasks_done"], time)
@@ -131,7 +131,7 @@ def compare(transitions: Transitions, scenes: int) -> None:
     for column in range(gaps.shape[1]):
         middle, high = np.quantile(gaps[:, column], [0.5, 0.99])
         spread = real_things[:, column].std()
-        print(f"    {ENVIRONMENT_STATE_NAMES[column]:18} {middle:9.4f} {high:9.4f} {spread:9.4f}")
+        print(f"    {STATION_STATE_NAMES[column]:18} {middle:9.4f} {high:9.4f} {spread:9.4f}")
 
 
 def main() -> int:

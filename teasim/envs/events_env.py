@@ -23,6 +23,7 @@ from teasim.envs.transitions import START, Moment, apply_change, load_transition
 from teasim.task.recipes import oven_is_on
 from teasim.task.scoring import Verdict, judge
 from teasim.world.liquids import CONTENTS
+from teasim.world.simulation import Simulation
 from teasim.world.station import draw_layout
 
 
@@ -80,6 +81,7 @@ class TeaMakingEventsEnv(gymnasium.Env[dict[str, Any], Any]):
         self._max_actions = check_max_actions(max_actions)
         self._randomize = randomize
         self._transitions = load_transitions()
+        self._still = Simulation()  # is never stepped: tells what the hands see
         self.observation_space = observation_space(obs_type, STATE_NAMES, (), (0, 0))
         self.action_space = spaces.Discrete(len(SUBTASKS))
 
@@ -136,9 +138,11 @@ class TeaMakingEventsEnv(gymnasium.Env[dict[str, Any], Any]):
         )
 
     def _observation(self) -> dict[str, np.ndarray]:
+        things = self._moment.things.astype(np.float32)
+        seen = self._still.seen_by_hands(self._moment.joints, things)
         return {
             "agent_pos": self._moment.joints.astype(np.float32),
-            "environment_state": self._moment.things.astype(np.float32),
+            "environment_state": np.concatenate([things, seen]),
         }
 
     def _info(self) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from teasim.constants import SUBTASKS
 from teasim.task.recipes import has_effect
 from teasim.task.subtasks import REGISTRY, Dropped
 from teasim.world.liquids import VESSELS
-from teasim.world.simulation import ENVIRONMENT_STATE_NAMES
+from teasim.world.simulation import STATION_STATE_NAMES
 from teasim.world.station import FREE_BODIES, Layout
 
 SHIPPED = Path(__file__).parent / "fitted" / "transitions.npz"
@@ -29,7 +29,7 @@ START = ""
 POSE = 7
 """Numbers of a pose: x, y, z [m] and a quaternion wxyz."""
 
-_AT = {name: place for place, name in enumerate(ENVIRONMENT_STATE_NAMES)}
+_AT = {name: place for place, name in enumerate(STATION_STATE_NAMES)}
 _POSES = slice(0, POSE * len(FREE_BODIES))
 _KNOB = _AT["knob_angle"]
 _AMOUNTS = slice(_AT[f"{next(iter(VESSELS))}_amount"], _AT["cup_tea"])
@@ -43,7 +43,7 @@ class Moment:
     joints: np.ndarray
     """Joint angles [rad] and openings [m].  # (16,)"""
     things: np.ndarray
-    """State of the objects, see `ENVIRONMENT_STATE_NAMES`.  # (E,)"""
+    """State of the objects, see `STATION_STATE_NAMES`.  # (E,)"""
     spilled: np.ndarray
     """Amount of every content on table and hob [ml or g].  # (C,)"""
     done: tuple[str, ...]
@@ -149,7 +149,7 @@ def load_transitions(file: Path = SHIPPED) -> Transitions:
 
 def placed(layout: Layout) -> Moment:
     """Return the moment in which everything has been put into `layout` and nothing has moved."""
-    things = np.zeros(len(ENVIRONMENT_STATE_NAMES))
+    things = np.zeros(len(STATION_STATE_NAMES))
     for name in FREE_BODIES:
         at = layout[name]
         things[_pose(name)] = (at.x, at.y, at.z, *at.quaternion)

@@ -59,6 +59,11 @@ class Controller(Saved):
             [data.qpos[self._joint_addresses], 2 * data.qpos[self._finger_addresses]]
         )
 
+    def put(self, state: np.ndarray, data: mujoco.MjData) -> None:
+        """Put the arms where `measured` returned `state`, without physics."""
+        data.qpos[self._joint_addresses] = state[: self._count]
+        data.qpos[self._finger_addresses] = state[self._count :] / 2
+
     def commands(self, target: np.ndarray, data: mujoco.MjData) -> "_Segment":
         """Start a control step towards `target` (2 n + 2,): angles [rad] and openings [m]."""
         goal = np.clip(target[: self._count], self._limits[:, 0], self._limits[:, 1])

@@ -25,7 +25,7 @@ SETTLE_TIME = 0.8
 _UPDATE = PHYSICS_TIMESTEP * STEPS_PER_UPDATE
 _SEEN_BY_HANDS = (*FREE_BODIES, "knob")
 
-ENVIRONMENT_STATE_NAMES = (
+STATION_STATE_NAMES = (
     *(f"{body}_{part}" for body in FREE_BODIES for part in ("x", "y", "z", "qw", "qx", "qy", "qz")),
     "knob_x",
     "knob_y",
@@ -34,11 +34,12 @@ ENVIRONMENT_STATE_NAMES = (
     *(f"cup_{content}" for content in CONTENTS),
     "cup_tea",
     "cup_mixed",
-    *hand_view_names(_SEEN_BY_HANDS),
 )
-"""Names of the environment state: poses in the world [m, wxyz], knob [m, rad], amounts [ml or g],
-shares, poses of both hands in the world, and poses of all things in the frames of the hands
-(`teasim.world.bodies.hand_view`) [m, wxyz]."""
+"""Names of the state of all objects: poses in the world [m, wxyz], knob [m, rad], amounts [ml or
+g], shares."""
+ENVIRONMENT_STATE_NAMES = (*STATION_STATE_NAMES, *hand_view_names(_SEEN_BY_HANDS))
+"""Names of the environment state: those of the station, poses of both hands in the world, and poses
+of all things in the frames of the hands (`teasim.world.bodies.hand_view`) [m, wxyz]."""
 
 
 class Simulation:
@@ -170,6 +171,26 @@ class Simulation:
         rest = [*place[:2], self.data.qpos[self._knob], *amounts]
         seen = self._hand_view.read(self.data)
         return np.concatenate([self.data.qpos[self._poses], rest, seen]).astype(np.float32)
+
+    def seen_by_hands(self, joints: np.ndarray, things: np.ndarray) -> np.ndarray:
+        """Put arms and objects somewhere without physics; return what follows from it.
+
+        Use it on a station that is never stepped.
+
+        Args:
+            joints: joint angles [rad] and openings [m] (2 n + 2,), as `joint_state` returns them.
+            things: state of the objects, see `STATION_STATE_NAMES`.
+
+        Returns:
+            The part of the environment state after `STATION_STATE_NAMES`, float32.
+        """
+        named = dict(zip(STATION_STATE_NAMES, things.tolist(), strict=True))
+        self._controller.put(joints, self.data)
+        self.data.qpos[self._poses] = things[: len(self._poses)]
+        self.data.qpos[self._knob] = named["knob_angle"]
+        self.model.body_pos[self._knob_body][:2] = named["knob_x"], named["knob_y"]
+        mujoco.mj_kinematics(self.model, self.data)
+        return self._hand_view.read(self.data).astype(np.float32)
 
     def paint(self) -> None:
         """Update what pictures show: levels, puddles, limbs, and the glow of the hob."""

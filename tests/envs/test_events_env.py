@@ -20,9 +20,9 @@ from teasim.envs.transitions import (
     situations,
 )
 from teasim.task.recipes import SEQ_1, recognisable
-from teasim.world.simulation import ENVIRONMENT_STATE_NAMES
+from teasim.world.simulation import STATION_STATE_NAMES
 
-AT = {name: place for place, name in enumerate(ENVIRONMENT_STATE_NAMES)}
+AT = {name: place for place, name in enumerate(STATION_STATE_NAMES)}
 
 
 @pytest.fixture
@@ -132,7 +132,7 @@ def moments():
     random = np.random.default_rng(2)
 
     def draw(done):
-        things = random.normal(size=len(ENVIRONMENT_STATE_NAMES))
+        things = random.normal(size=len(STATION_STATE_NAMES))
         quaternions = things[: 7 * 6].reshape(6, 7)[:, 3:]
         quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
         things[AT["kettle_amount"] : AT["cup_tea"]] = random.uniform(0, 100, 6)
@@ -169,7 +169,7 @@ def test_transitions_survive_a_file_bit_for_bit(tmp_path):
 
 
 def test_a_situation_that_was_not_measured_is_named():
-    moment = Moment(np.zeros(16), np.zeros(len(ENVIRONMENT_STATE_NAMES)), np.zeros(3), (), 0.0)
+    moment = Moment(np.zeros(16), np.zeros(len(STATION_STATE_NAMES)), np.zeros(3), (), 0.0)
     with pytest.raises(ConfigError) as error:
         Transitions({}).draw(moment, "stir", np.random.default_rng(0))
     here = Situation("stir", effect=False, bag=False, water=False)

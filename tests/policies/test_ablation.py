@@ -178,7 +178,7 @@ POOLS = 'pools = ["pool"]\n'
         (POOLS + 'filters = "norm"', "'filters' must be tables, [filters.NAME] each."),
         (
             POOLS + 'learners = ["sac"]\n' + FILTERS,
-            "Unknown learner 'sac'; choose bc, bc-rnn, bcnd, demodice, nearest, r-maxent.",
+            "Unknown learner 'sac'; choose act, bc, bc-rnn, bcnd, demodice, nearest, r-maxent.",
         ),
         (
             POOLS + 'learners = ["demodice"]\n' + FILTERS,
@@ -199,7 +199,7 @@ POOLS = 'pools = ["pool"]\n'
             POOLS + "[learners.bc]\nsteps = '2'\n" + FILTERS,
             "The setting 'steps' of the learner 'bc' must be a whole number or none, not '2'.",
         ),
-        (POOLS + "[learners.mine]\n" + FILTERS, "Unknown learner 'mine'; choose bc, "),
+        (POOLS + "[learners.mine]\n" + FILTERS, "Unknown learner 'mine'; choose act, bc, "),
         (
             POOLS + "learners = 3\n" + FILTERS,
             "'learners' must be a list of str, or tables, [learners.NAME] each.",
