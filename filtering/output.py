@@ -80,8 +80,8 @@ def write_filter_output(
 ) -> None:
     """Write FILES to the folder `out`, each atomically, the page last.
 
-    Videos that are not embedded in the page are in a folder `videos` beside it. An error while the
-    page is made becomes a warning on stderr: the results are already written.
+    Videos that are not embedded in the page are in a folder `videos` beside it. An error while
+    the page is made becomes a warning on stderr: the results are already written.
 
     Args:
         out: new or empty folder, or one with an earlier output.

@@ -13,6 +13,7 @@ from policies.learners.subtask_policy import SubtaskPolicy
 from policies.ppo import PPOConfig, Update, improve, untrained
 from policies.settings import PPO_LEARNER, TrainSettings
 from teasim.common.errors import ConfigError
+from teasim.common.figures import CurvesFigure, save_figures
 from teasim.common.files import check_new_folder
 from teasim.common.workers import IN_PROCESS
 from teasim.pool import Pool
@@ -91,6 +92,10 @@ def reinforce(settings: TrainSettings) -> Reinforcement:
         "history": [asdict(update) for update in curve],
     }
     save_policy(policy, settings.out, training=record)
+    if settings.figures is not None:
+        reached = tuple(100 * update.success for update in curve if update.success is not None)
+        drawing = CurvesFigure({PPO_LEARNER: reached}, "goal reached [%]", "update with episodes")
+        save_figures(settings.figures, {"training": drawing})
     seconds = time.perf_counter() - began
     return Reinforcement(policy, settings.out, settings.start, curve, seconds)
 

@@ -123,21 +123,15 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
     level = LEVELS[settings.level]
     samples = level.load(pool, demos, workers=settings.workers)
     learner = kind.make(seed=settings.seed, **options).fit(samples, weights)
-    record = {
-        **{name: getattr(settings, name) for name in RECORDED},
-        "weights": None if settings.weights is None else str(settings.weights),
-        "use": settings.chosen_use,
+    record = _record(settings, pool, weights.tolist()) | {
         "settings": asdict(learner.config),
-        "demo_weights": {e.demo_id: w for e, w in zip(pool.episodes, weights, strict=True)},
-        "pool": pool.content_hash(),
-        "version": version("teasim"),
         "history": learner.history_,
     }
     save_policy(learner.policy_, settings.out, training=record)
+    write_losses(learner.history_, settings.out / LOSSES)
     if settings.figures is not None:
         curve = CurvesFigure({settings.learner: tuple(map(float, learner.history_))})
         save_figures(settings.figures, {"training": curve})
-    write_losses(learner.history_, settings.out / LOSSES)
     return Training(
         policy=learner.policy_,
         out=settings.out,
@@ -148,6 +142,18 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
         loss=float(learner.history_[-1]),
         seconds=time.perf_counter() - began,
     )
+
+
+def _record(settings: TrainSettings, pool: Pool, weights: list[float]) -> dict[str, Any]:
+    """Return what a policy is trained on and how, as JSON can hold it."""
+    return {
+        **{name: getattr(settings, name) for name in RECORDED},
+        "weights": None if settings.weights is None else str(settings.weights),
+        "use": settings.chosen_use,
+        "demo_weights": {e.demo_id: w for e, w in zip(pool.episodes, weights, strict=True)},
+        "pool": pool.content_hash(),
+        "version": version("teasim"),
+    }
 
 
 def write_losses(history: Sequence[float], path: Path) -> None:

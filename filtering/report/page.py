@@ -10,8 +10,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from filtering.report.layout import Mark, place_marks, strip_of
-from teasim.common.colours import colours_of, ink_on
 from teasim.common.errors import TeasimError
+from teasim.common.figures.colours import colours_of, ink_on
 from teasim.common.files import write_text
 from teasim.pool.weight_table import COLUMNS
 
@@ -171,36 +171,40 @@ def render_report(
     Raises:
         TeasimError: the file cannot be written.
     """
-    ordered = sorted(demos, key=lambda demo: (demo.weight, demo.episode_index))
-    longest = max((demo.seconds for demo in demos), default=1.0) or 1.0
-    names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
-    page = (
-        _environment()
-        .get_template("page.html.j2")
-        .render(
-            title=title,
-            summary=summary or _count_flagged(demos),
-            words=words,
-            truth=_compared(demos),
-            demos=ordered,
-            threshold=threshold,
-            colours=colours_of(names),
-            ink_on=ink_on,
-            longest=longest,
-            strip=strip_of([demo.weight for demo in ordered]),
-            groups=list(dict.fromkeys(d.group_text for d in sorted(demos, key=_group_number))),
-            sections=sections,
-            unit=unit,
-            with_videos=any(demo.videos for demo in demos),
-            data=_data(ordered, names),
-            films=_films(ordered),
-            place_marks=lambda marks: place_marks(marks, longest),
-        )
-    )
+    content = {
+        "title": title,
+        "summary": summary or _count_flagged(demos),
+        "words": words,
+        "threshold": threshold,
+        "sections": sections,
+        "unit": unit,
+    }
+    page = _environment().get_template("page.html.j2").render(content | _shown(demos, subtasks))
     try:
         write_text(Path(path), page)
     except OSError as error:
         raise TeasimError(f"The report '{path}' cannot be written: {error.strerror}.") from error
+
+
+def _shown(demos: Sequence[DemoView], subtasks: Sequence[str]) -> dict[str, Any]:
+    """Return what the template shows of the demonstrations, the lowest weight first."""
+    ordered = sorted(demos, key=lambda demo: (demo.weight, demo.episode_index))
+    longest = max((demo.seconds for demo in demos), default=1.0) or 1.0
+    names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
+    by_group = sorted(demos, key=lambda demo: demo.group_number)
+    return {
+        "demos": ordered,
+        "truth": _compared(demos),
+        "colours": colours_of(names),
+        "ink_on": ink_on,
+        "longest": longest,
+        "strip": strip_of([demo.weight for demo in ordered]),
+        "groups": list(dict.fromkeys(demo.group_text for demo in by_group)),
+        "with_videos": any(demo.videos for demo in demos),
+        "data": _data(ordered, names),
+        "films": _films(ordered),
+        "place_marks": lambda marks: place_marks(marks, longest),
+    }
 
 
 def _environment() -> Environment:
@@ -242,10 +246,6 @@ def _films(demos: Sequence[DemoView]) -> Markup:
 def _json(content: Mapping[str, Any]) -> Markup:
     """Return JSON that is safe inside a script element."""
     return Markup(json.dumps(content, ensure_ascii=False).replace("<", "\\u003c"))
-
-
-def _group_number(demo: DemoView) -> int:
-    return demo.group_number
 
 
 def _spoken(text: str) -> str:

@@ -8,8 +8,8 @@ from filtering.demo_filter import DemoFilter
 from filtering.output import FILES, write_filter_output
 from filtering.report import DemoView, Mark, ReportSection, Segment, render_report
 from filtering.report.layout import TALLEST, place_dots, place_marks, strip_of
-from teasim.common.colours import colours_of, contrast, ink_on
 from teasim.common.errors import ConfigError
+from teasim.common.figures.colours import colours_of, contrast, ink_on
 from teasim.pool import Pool, Span
 from teasim.pool.segments_table import read_segments_table
 from teasim.pool.weight_table import read_weight_table

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from teasim.common.colours import colours_of
+from teasim.common.figures.colours import colours_of
 
 SHIFT = 0.08
 """Distance between the intervals of series at the same K, so that they do not cover each other."""

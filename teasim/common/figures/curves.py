@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from teasim.common.colours import colours_of
+from teasim.common.figures.colours import colours_of
 
 MARKED = 40
 """Largest number of values that are also marked by dots."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teasim.common.colours import colours_of, ink_on
+from teasim.common.figures.colours import colours_of, ink_on
 
 AGREED = 0.85
 """Share of the demonstrations from which an order is drawn; the rest are free. Set by judgement:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from teasim.common.colours import colours_of
+from teasim.common.figures.colours import colours_of
 
 
 @dataclass(frozen=True)
