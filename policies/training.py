@@ -134,10 +134,7 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
         "history": learner.history_,
     }
     save_policy(learner.policy_, settings.out, training=record)
-    if settings.figures is not None:
-        curve = CurvesFigure({settings.learner: tuple(map(float, learner.history_))})
-        save_figures(settings.figures, {"training": curve})
-    write_losses(learner.history_, settings.out / LOSSES)
+    _show_losses(settings, learner.history_)
     return Training(
         policy=learner.policy_,
         out=settings.out,
@@ -148,6 +145,14 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
         loss=float(learner.history_[-1]),
         seconds=time.perf_counter() - began,
     )
+
+
+def _show_losses(settings: TrainSettings, history: Sequence[float]) -> None:
+    """Write the training losses beside the policy, and draw them if figures are asked for."""
+    write_losses(history, settings.out / LOSSES)
+    if settings.figures is not None:
+        curve = CurvesFigure({settings.learner: tuple(map(float, history))})
+        save_figures(settings.figures, {"training": curve})
 
 
 def write_losses(history: Sequence[float], path: Path) -> None:
