@@ -128,10 +128,7 @@ def train(settings: TrainSettings) -> "Training | Reinforcement":
         "history": learner.history_,
     }
     save_policy(learner.policy_, settings.out, training=record)
-    write_losses(learner.history_, settings.out / LOSSES)
-    if settings.figures is not None:
-        curve = CurvesFigure({settings.learner: tuple(map(float, learner.history_))})
-        save_figures(settings.figures, {"training": curve})
+    _show_losses(settings, learner.history_)
     return Training(
         policy=learner.policy_,
         out=settings.out,
@@ -154,6 +151,14 @@ def _record(settings: TrainSettings, pool: Pool, weights: list[float]) -> dict[s
         "pool": pool.content_hash(),
         "version": version("teasim"),
     }
+
+
+def _show_losses(settings: TrainSettings, history: Sequence[float]) -> None:
+    """Write the training losses beside the policy, and draw them if figures are asked for."""
+    write_losses(history, settings.out / LOSSES)
+    if settings.figures is not None:
+        curve = CurvesFigure({settings.learner: tuple(map(float, history))})
+        save_figures(settings.figures, {"training": curve})
 
 
 def write_losses(history: Sequence[float], path: Path) -> None:
