@@ -46,6 +46,9 @@ class FilterCommand:
     """Settings of the filter."""
     options: Annotated[ReadOptions, tyro.conf.OmitArgPrefixes]
     """What the format of the source does not store."""
+    task: str | None = None
+    """Judge the demonstrations of this task alone. By default those of each task are judged by
+    themselves."""
     max_flagged: float = 1.0
     """Exit with code 1 if more than this share of the demonstrations is flagged, 0 to 1."""
     workers: WorkerOptions = field(default_factory=Workers)
@@ -132,7 +135,7 @@ def segment(argv: Sequence[str] | None = None) -> int:
 
 
 def _filter(command: FilterCommand) -> int:
-    from filtering.by_task import fit_by_task
+    from filtering.by_task import fit_by_task, of_task
     from filtering.output import check_output, write_filter_output
     from filtering.report.figures import save_filter_figures
     from teasim.pool.readers.registry import open_source
@@ -142,6 +145,8 @@ def _filter(command: FilterCommand) -> int:
     pool = open_source(command.source, command.options)
     print_notes(pool)
     check_output(command.out, pool.root, overwrite=command.overwrite)
+    if command.task is not None:
+        pool = of_task(pool, command.task)
     fitted = fit_by_task(command.config, pool, workers=command.workers)
     write_filter_output(
         command.out,
@@ -183,13 +188,31 @@ def _print_result(pool: "Source", fitted: "DemoFilter") -> None:
         count = len(fitted.segments_.subtasks)
         found = "1 sub-task" if count == 1 else f"{count} sub-tasks"
         print(f"{found}, recognised with a mean probability of {confidence:.2f}.")
-    names = {demo.demo_id: demo.name for demo in pool.episodes}
-    for row in fitted.table():
-        if row.reason:
-            print(f"{names[row.demo_id]}  weight {row.weight:.2f}  {row.reason}")
-    print(f"{int(fitted.flagged_.sum())} of {len(fitted.weights_)} demonstrations are flagged.")
-    for words in fitted.words_:
-        print(words)
+    names = [demo.name for demo in pool.episodes]
+    if not fitted.tasks_:
+        _print_verdicts(fitted, names, range(len(names)), fitted.words_)
+        return
+    for task in fitted.tasks_:
+        if task.judged:
+            print(f"\nTask '{task.name}':")
+            _print_verdicts(fitted, names, task.rows, task.words)
+    print("", *(task.words[0] for task in fitted.tasks_ if not task.judged), sep="\n")
+    flagged, count = int(fitted.flagged_.sum()), len(names)
+    print(f"In all, {flagged} of {count} demonstrations of {len(fitted.tasks_)} tasks are flagged.")
+
+
+def _print_verdicts(
+    fitted: "DemoFilter", names: Sequence[str], rows: Sequence[int], words: Sequence[str]
+) -> None:
+    """Print what is said about some demonstrations, and about them as a whole."""
+    table = fitted.table()
+    for row in rows:
+        if table[row].reason:
+            print(f"{names[row]}  weight {table[row].weight:.2f}  {table[row].reason}")
+    flagged = sum(table[row].flagged for row in rows)
+    print(f"{flagged} of {len(rows)} demonstrations are flagged.")
+    for sentence in words:
+        print(sentence)
 
 
 def _fit(command: FitCommand) -> int:

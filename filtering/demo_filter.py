@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -29,6 +29,7 @@ from filtering.vision.frame_features import FrameSource
 from filtering.vision.frames import chosen_cameras, frame_rate, main_camera
 from teasim.common.errors import ConfigError
 from teasim.common.workers import IN_PROCESS, Workers
+from teasim.pool.selection import task_line
 from teasim.pool.soundness import require_sound
 from teasim.pool.source import Source
 from teasim.pool.weight_table import WeightRow
@@ -69,6 +70,20 @@ def instead(usual: tuple[str, ...], used: tuple[str, ...]) -> str:
     )
 
 
+@dataclass(frozen=True)
+class TaskFound:
+    """What was found about one task of a pool of several."""
+
+    name: str
+    """The task."""
+    rows: tuple[int, ...]
+    """Positions of its demonstrations in the pool."""
+    judged: bool
+    """Whether they were judged; if not, all are kept."""
+    words: tuple[str, ...]
+    """Sentences about the task as a whole."""
+
+
 class DemoFilter:
     """Gives every demonstration of a pool a weight; labels of correctness are never read.
 
@@ -106,6 +121,7 @@ from the whole video.
         findings_: unusual steps of each demonstration, the most important one first.
         summary_: ways of carrying out the task, and risks of steps; None for the score moments.
         words_: sentences about the pool as a whole.
+        tasks_: the tasks, where several were judged one by one; see `filtering.by_task`.
         threshold_: weight below which a demonstration is flagged; 0 when there is none.
         trust_ (D,): influence on the norm, in [0, 1]; w of equation 3, of sum M.
         objective_: value of equation 3 [nats per step]; None for another score.
@@ -128,6 +144,7 @@ from the whole video.
     findings_: tuple[tuple[Finding, ...], ...]
     summary_: PoolSummary | None
     words_: tuple[str, ...]
+    tasks_: tuple[TaskFound, ...]
     threshold_: float
     trust_: NDArray[np.float64]
     objective_: float | None
@@ -155,6 +172,7 @@ from the whole video.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
         self.timings_, self._notes = {}, tuple[str, ...]()
+        self.tasks_ = ()
         self._check(pool)
         require_sound(pool)
         self.chosen_ = self.config.for_source(pool)
@@ -164,7 +182,7 @@ from the whole video.
         self._learn(self._judge(pool, workers), pool.fps)
         self._sum_up()
         self.looked_at_ = tuple(camera for camera in pool.cameras if camera in self._seen)
-        self._identities = [(episode.demo_id, episode.index) for episode in pool.episodes]
+        self._identify(pool)
         return self
 
     def table(self) -> tuple[WeightRow, ...]:
@@ -179,9 +197,14 @@ from the whole video.
                 group=int(self.groups_[row]),
                 reason=self.reasons_[row],
                 p_incorrect=float(self.probabilities_[row]),
+                task=task,
             )
-            for row, (demo_id, index) in enumerate(self._identities)
+            for row, (demo_id, index, task) in enumerate(self._identities)
         )
+
+    def _identify(self, pool: Source) -> None:
+        """Keep what `table` says of each demonstration beside the verdict; a task is one line."""
+        self._identities = [(e.demo_id, e.index, task_line(e)) for e in pool.episodes]
 
     def _check(self, pool: Source) -> None:
         count = len(pool.episodes)

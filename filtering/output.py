@@ -160,6 +160,7 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "probability_is": PROBABILITY if fitted.decision_ is None else LEARNED,
         "decision": _decision_record(fitted),
         "words": list(fitted.words_),
+        "tasks": _tasks_record(fitted),
         "sequences": _sequences_record(fitted),
         "risk_of_leaving_out": fitted.summary_.risks if fitted.summary_ else None,
         "seconds": {stage: round(spent, 3) for stage, spent in fitted.timings_.items()},
@@ -180,6 +181,23 @@ def _decision_record(fitted: DemoFilter) -> dict[str, Any] | None:
         "expected_recall": found.expected_recall,
         "model_sha256": found.sha256,
     }
+
+
+def _tasks_record(fitted: DemoFilter) -> list[dict[str, Any]] | None:
+    """Return what was found task by task; None where all were judged together."""
+    if not fitted.tasks_:
+        return None
+    table = fitted.table()
+    return [
+        {
+            "task": task.name,
+            "judged": task.judged,
+            "demonstrations": [table[row].demo_id for row in task.rows],
+            "flagged": sum(table[row].flagged for row in task.rows),
+            "words": list(task.words),
+        }
+        for task in fitted.tasks_
+    ]
 
 
 def _sequences_record(fitted: DemoFilter) -> list[dict[str, Any]] | None:

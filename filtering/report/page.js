@@ -126,9 +126,9 @@ function count() {
 function judged(row) {
   const says = kept.verdicts[row[1]];
   if (!says) return row;
-  const bad = says === "incorrect", [id, index, , loss, flagged, group, reason] = row;
+  const bad = says === "incorrect", [id, index, , loss, flagged, group, reason, , task] = row;
   const told = bad === (flagged === "1") ? reason : `A person calls it ${says}.` + (reason && " The filter said: " + reason);
-  return [id, index, bad ? "0.0" : "1.0", loss, bad ? "1" : "0", bad ? String(Math.max(1, group)) : "0", told, bad ? "1.0" : "0.0"];
+  return [id, index, bad ? "0.0" : "1.0", loss, bad ? "1" : "0", bad ? String(Math.max(1, group)) : "0", told, bad ? "1.0" : "0.0", task];
 }
 const cell = (text) => /[",\r\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
 function save(name, type, text) {
@@ -187,27 +187,28 @@ const orders = {
   index: number("index"),
   group: (a, b) => number("number")(b, a) || orders.weight(a, b),
 };
-element("order").addEventListener("change", (event) => list.append(...demos.sort(orders[event.target.value])));
+const byTask = number("place"); // the videos of a task stay together
+element("order").addEventListener("change", (event) => list.append(...demos.sort((a, b) => byTask(a, b) || orders[event.target.value](a, b))));
 function filter() {
-  const words = element("search").value.trim().toLowerCase(), what = element("show").value, group = element("group")?.value;
+  const words = element("search").value.trim().toLowerCase(), what = element("show").value, group = element("group")?.value, task = element("task")?.value;
   let shown = 0;
   for (const demo of demos) {
     const flagged = demo.classList.contains("flagged");
     const fits = { all: true, flagged, kept: !flagged, open: !kept.verdicts[demo.dataset.index] }[what];
-    demo.hidden = !(fits && (!group || demo.dataset.group === group) && (!words || textOf(demo).includes(words)));
+    demo.hidden = !(fits && (!group || demo.dataset.group === group) && (!task || demo.dataset.place === task) && (!words || textOf(demo).includes(words)));
     shown += !demo.hidden;
     if (demo.hidden) for (const video of demo.querySelectorAll("video")) video.pause();
   }
   element("count").textContent = `${shown} of ${demos.length} shown`;
 }
-for (const id of ["search", "show", "group"]) element(id)?.addEventListener("input", filter);
+for (const id of ["search", "show", "group", "task"]) element(id)?.addEventListener("input", filter);
 element("truth")?.addEventListener("change", (event) => element("page").classList.toggle("no-truth", !event.target.checked));
 function arrive() { // a link to a video that is filtered away shows all
   const target = /^#demo-\d+$/.test(location.hash) && document.querySelector(location.hash);
   if (!target) return;
   if (target.hidden) {
     element("search").value = "";
-    for (const id of ["show", "group"]) if (element(id)) element(id).selectedIndex = 0;
+    for (const id of ["show", "group", "task"]) if (element(id)) element(id).selectedIndex = 0;
     filter();
   }
   target.scrollIntoView();

@@ -106,6 +106,10 @@ class DemoView:
     """What the labels of the pool say; None where there are none."""
     labels: tuple[Segment, ...] = ()
     """Labelled sub-tasks; empty where there are none, or they are its segments."""
+    task: str = ""
+    """Its task; empty where the pool does not name one."""
+    task_number: int = 0
+    """Number of its task where tasks were judged one by one, else 0."""
 
     @property
     def heading(self) -> str:
@@ -129,7 +133,7 @@ class DemoView:
         numbers = [str(self.episode_index), repr(self.weight), repr(self.loss)]
         return [
             *(self.demo_id, *numbers, str(int(self.flagged))),
-            *(str(self.group_number), self.reason, p),
+            *(str(self.group_number), self.reason, p, self.task),
         ]
 
 
@@ -187,8 +191,8 @@ def render_report(
 
 
 def _shown(demos: Sequence[DemoView], subtasks: Sequence[str]) -> dict[str, Any]:
-    """Return what the template shows of the demonstrations, the lowest weight first."""
-    ordered = sorted(demos, key=lambda demo: (demo.weight, demo.episode_index))
+    """Return what the template shows of the demonstrations, task by task, the lowest weight first."""
+    ordered = sorted(demos, key=lambda demo: (demo.task_number, demo.weight, demo.episode_index))
     longest = max((demo.seconds for demo in demos), default=1.0) or 1.0
     names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
     by_group = sorted(demos, key=lambda demo: demo.group_number)
@@ -199,6 +203,7 @@ def _shown(demos: Sequence[DemoView], subtasks: Sequence[str]) -> dict[str, Any]
         "ink_on": ink_on,
         "longest": longest,
         "strip": strip_of([demo.weight for demo in ordered]),
+        "tasks": {demo.task_number: demo.task for demo in ordered},
         "groups": list(dict.fromkeys(demo.group_text for demo in by_group)),
         "with_videos": any(demo.videos for demo in demos),
         "data": _data(ordered, names),

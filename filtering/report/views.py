@@ -12,6 +12,7 @@ from filtering.report.videos import Embed, Film, Key, Wanted, page_films
 from filtering.vision.frames import frame_rate
 from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool import Span
+from teasim.pool.selection import task_line
 from teasim.pool.source import Demonstration, Source
 
 
@@ -92,6 +93,8 @@ def _view(
         exhibits=tuple(_exhibit_view(pool, item, films) for item in exhibits) if own else (),
         truth=_truth(episode, clock),
         labels=logged,
+        task=task_line(episode),
+        task_number=next((n for n, t in enumerate(fitted.tasks_) if demo in t.rows), 0),
     )
 
 

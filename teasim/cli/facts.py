@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from teasim.common.errors import PoolError
+from teasim.pool.selection import tasks_of
 
 if TYPE_CHECKING:
     from teasim.pool.source import Demonstration, Source
@@ -16,6 +17,8 @@ WIDTH = 80
 """Columns of the text, those of a terminal that nobody has resized."""
 WIDEST_CELL = 19
 """Characters after which a cell is cut off; a demo_id has 19."""
+MOST_TASKS = 10
+"""Most tasks that the text names; a data set may have hundreds."""
 UNKNOWN = "-"
 """What the text shows for a value that is not stored."""
 
@@ -52,6 +55,8 @@ class SourceFacts:
     """Names of the cameras."""
     fps: float | None
     """Frames per second [1/s]."""
+    tasks: dict[str, int] | None
+    """Number of demonstrations of each task that is named."""
     subtasks: tuple[str, ...]
     """Names of the logged sub-tasks in the order of their numbers."""
     state_names: tuple[str, ...] | None
@@ -67,11 +72,16 @@ def facts_of(source: Source) -> SourceFacts:
     return SourceFacts(
         cameras=source.cameras,
         fps=source.fps,
+        tasks=_unless_damaged(lambda: _tasks(source)),
         subtasks=source.subtasks,
         state_names=getattr(source, "state_names", None),  # not every format has a joint log
         content_hash=_unless_damaged(source.content_hash),
         demonstrations=tuple(_demonstration(source, demo) for demo in source.episodes),
     )
+
+
+def _tasks(source: Source) -> dict[str, int]:
+    return {task: len(positions) for task, positions in tasks_of(source).items() if task}
 
 
 def _demonstration(source: Source, demo: Demonstration) -> DemonstrationFacts:
@@ -110,6 +120,7 @@ def text_of(path: str, format_name: str, facts: SourceFacts) -> str:
         "Source": path,
         "Format": format_name,
         "Demonstrations": f"{len(demonstrations)}, {duration} in total",
+        "Tasks": _named_tasks(facts.tasks or {}),
         "Cameras": ", ".join(facts.cameras) or "none",
         "Frame rate": "not stored" if facts.fps is None else f"{facts.fps:g} per second",
         "Joint log": joints,
@@ -119,6 +130,12 @@ def text_of(path: str, format_name: str, facts: SourceFacts) -> str:
     width = max(map(len, summary)) + 2
     lines = [_hanging(f"{name}:".ljust(width), value) for name, value in summary.items()]
     return "\n".join([*_table(facts), "", *lines])
+
+
+def _named_tasks(tasks: dict[str, int]) -> str:
+    named = [f"'{task}' ({count})" for task, count in tasks.items()]
+    more = [f"and {len(named) - MOST_TASKS} more"] if len(named) > MOST_TASKS else []
+    return ", ".join(named[:MOST_TASKS] + more) or "none named"
 
 
 def _table(facts: SourceFacts) -> Iterator[str]:

@@ -1,9 +1,24 @@
-"""Command lines with which other tools keep or leave out some demonstrations of a data set."""
+"""Some demonstrations of a data set: by task, and how other tools keep or leave them out."""
 
 import json
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
+
+from teasim.pool.source import Demonstration, Source
+
+
+def tasks_of(source: Source) -> dict[str, list[int]]:
+    """Return per task, in the order of first occurrence, the positions of its demonstrations."""
+    found: dict[str, list[int]] = {}
+    for position, episode in enumerate(source.episodes):
+        found.setdefault(episode.task, []).append(position)
+    return found
+
+
+def task_line(episode: Demonstration) -> str:
+    """Return the task of a demonstration in one line; empty where none is named."""
+    return " ".join(episode.task.split())
 
 
 def lerobot_usage(root: Path, indexes: Sequence[int], *, keep: bool) -> list[str]:

@@ -32,6 +32,8 @@ class WeightRow:
     """One sentence naming the step and time span; empty for a usual demonstration."""
     p_incorrect: float | None = None
     """Probability that it is incorrect, in [0, 1]; None in tables that do not have it."""
+    task: str = ""
+    """The task it was judged with; empty where the pool does not name one."""
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -48,15 +50,15 @@ class WeightRow:
             )
         if not math.isfinite(self.loss):
             raise PoolError(f"{what} has the loss {self.loss}; it must be finite.")
-        if any(character in self.demo_id + self.reason for character in "\r\n\0"):
-            raise PoolError(f"{what} has a reason of more than one line.")
+        if any(character in self.demo_id + self.reason + self.task for character in "\r\n\0"):
+            raise PoolError(f"{what} has a reason or a task of more than one line.")
         if self.group < 0:
             raise PoolError(f"{what} has the group {self.group}; groups count from 0.")
 
 
 COLUMNS = tuple(field.name for field in fields(WeightRow))
-EARLIER_COLUMNS = COLUMNS[:-1]
-"""Columns of tables without p_incorrect, which are still read."""
+EARLIER_COLUMNS = (COLUMNS[:-2], COLUMNS[:-1])
+"""Columns of tables without p_incorrect or task, which are still read."""
 
 
 def write_weight_table(path: Path | str, rows: Iterable[WeightRow]) -> None:
@@ -73,7 +75,8 @@ def write_weight_table(path: Path | str, rows: Iterable[WeightRow]) -> None:
     for row in ordered:
         numbers = [int(row.episode_index), float(row.weight), float(row.loss)]
         p = "" if row.p_incorrect is None else float(row.p_incorrect)
-        writer.writerow([row.demo_id, *numbers, int(row.flagged), int(row.group), row.reason, p])
+        rest = [int(row.flagged), int(row.group), row.reason, p, row.task]
+        writer.writerow([row.demo_id, *numbers, *rest])
     write_text(Path(path), text.getvalue())
 
 
@@ -91,7 +94,7 @@ def read_weight_table(path: Path | str) -> tuple[WeightRow, ...]:
         raise PoolError(f"There is no weight table at '{path}'.") from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise PoolError(f"The weight table '{path}' is not readable as CSV.") from error
-    if not lines or tuple(lines[0]) not in (COLUMNS, EARLIER_COLUMNS):
+    if not lines or tuple(lines[0]) not in (COLUMNS, *EARLIER_COLUMNS):
         raise PoolError(f"'{path}' is no weight table; its columns must be {', '.join(COLUMNS)}.")
     count = len(lines[0])
     rows = [_parse(path, number, cells, count) for number, cells in enumerate(lines[1:], start=2)]
@@ -124,7 +127,7 @@ def _parse(path: Path, line: int, cells: Sequence[str], count: int) -> WeightRow
     try:
         p = float(more[0]) if more and more[0] else None
         whole = (demo_id, int(index), float(weight), float(loss), flagged == "1", int(group))
-        return WeightRow(*whole, reason, p)
+        return WeightRow(*whole, reason, p, *more[1:])
     except ValueError as error:
         raise PoolError(f"Line {line} of '{path}' holds text in place of a number.") from error
 

@@ -23,6 +23,7 @@ ROWS = st.builds(
     group=st.integers(0, 5),
     reason=TEXT,
     p_incorrect=st.none() | st.floats(0, 1),
+    task=TEXT,
 )
 
 
@@ -40,16 +41,17 @@ def test_the_columns_are_the_contract(tmp_path: Path) -> None:
     path = tmp_path / "weights.csv"
     write_weight_table(path, [ROW])
     header, line = path.read_text().splitlines()
-    assert header == "demo_id,episode_index,weight,loss,flagged,group,reason,p_incorrect"
-    assert line == 'ab12,0,0.25,1.5,1,1,"Stirring is missing, at 12.0 s.",0.75'
+    assert header == "demo_id,episode_index,weight,loss,flagged,group,reason,p_incorrect,task"
+    assert line == 'ab12,0,0.25,1.5,1,1,"Stirring is missing, at 12.0 s.",0.75,'
 
 
-def test_tables_without_probabilities_are_read(tmp_path: Path) -> None:
+def test_tables_without_probabilities_or_tasks_are_read(tmp_path: Path) -> None:
     path = tmp_path / "weights.csv"
-    path.write_text(
-        "demo_id,episode_index,weight,loss,flagged,group,reason\nab12,0,0.25,1.5,1,1,x\n"
-    )
+    usual = "demo_id,episode_index,weight,loss,flagged,group,reason"
+    path.write_text(f"{usual}\nab12,0,0.25,1.5,1,1,x\n")
     assert read_weight_table(path) == (replace(ROW, reason="x", p_incorrect=None),)
+    path.write_text(f"{usual},p_incorrect\nab12,0,0.25,1.5,1,1,x,0.75\n")
+    assert read_weight_table(path) == (replace(ROW, reason="x"),)
 
 
 def test_numpy_values_are_written_as_numbers(tmp_path: Path) -> None:
@@ -68,7 +70,7 @@ def test_numpy_values_are_written_as_numbers(tmp_path: Path) -> None:
         ({"weight": float("nan")}, "has the weight nan; it must lie in [0, 1]."),
         ({"p_incorrect": -0.1}, "has the probability -0.1; it must lie in [0, 1]."),
         ({"loss": float("inf")}, "has the loss inf; it must be finite."),
-        ({"reason": "one\ntwo"}, "has a reason of more than one line."),
+        ({"reason": "one\ntwo"}, "has a reason or a task of more than one line."),
         ({"group": -1}, "has the group -1; groups count from 0."),
         ({"demo_id": ""}, "has no demo_id."),
     ],
@@ -84,11 +86,11 @@ def test_values_out_of_range_are_refused(changes: dict[str, object], message: st
     [
         ("", "is no weight table; its columns must be demo_id, episode_index, weight, loss"),
         ("a,b\n1,2\n", "is no weight table; its columns must be"),
-        (f"{','.join(COLUMNS)}\nx,0,0.5\n", "has 3 values; a weight table has 8."),
-        (f"{','.join(COLUMNS)}\nx,0,half,1,0,0,r,\n", "holds text in place of a number."),
-        (f"{','.join(COLUMNS)}\nx,0,0.5,1,yes,0,r,\n", "says flagged is 'yes'; choose 0 or 1."),
-        (f"{','.join(COLUMNS)}\nx,0,2,1,0,0,r,\n", "has the weight 2.0; it must lie in [0, 1]."),
-        (f"{','.join(COLUMNS)}\nx,0,1,1,0,0,r,\ny,0,1,1,0,0,r,\n", "has demonstration 0 twice."),
+        (f"{','.join(COLUMNS)}\nx,0,0.5\n", "has 3 values; a weight table has 9."),
+        (f"{','.join(COLUMNS)}\nx,0,half,1,0,0,r,,\n", "holds text in place of a number."),
+        (f"{','.join(COLUMNS)}\nx,0,0.5,1,yes,0,r,,\n", "says flagged is 'yes'; choose 0 or 1."),
+        (f"{','.join(COLUMNS)}\nx,0,2,1,0,0,r,,\n", "has the weight 2.0; it must lie in [0, 1]."),
+        (f"{','.join(COLUMNS)}\nx,0,1,1,0,0,r,,\ny,0,1,1,0,0,r,,\n", "has demonstration 0 twice."),
     ],
 )
 def test_a_table_that_is_none_is_told(tmp_path: Path, text: str, message: str) -> None:
