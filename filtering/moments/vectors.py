@@ -64,7 +64,7 @@ def agreeing(vectors: Sequence[Vectors], differences: Iterable[Vectors]) -> list
         wide = rows.astype(np.float64)
         scatter += wide.T @ wide
         count += len(rows)
-    if not count:
+    if not scatter.any():  # there are no counterparts, or all of them are copies
         return list(vectors)
     variances, axes = np.linalg.eigh(scatter / count)
     variances = np.maximum(variances, 0.0)
