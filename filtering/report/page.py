@@ -191,7 +191,7 @@ def render_report(
 
 
 def _shown(demos: Sequence[DemoView], subtasks: Sequence[str]) -> dict[str, Any]:
-    """Return what the template shows of the demonstrations, task by task, the lowest weight first."""
+    """Return what the template shows: demonstrations task by task, the lowest weight first."""
     ordered = sorted(demos, key=lambda demo: (demo.task_number, demo.weight, demo.episode_index))
     longest = max((demo.seconds for demo in demos), default=1.0) or 1.0
     names = list(subtasks) or sorted({part.subtask for demo in demos for part in demo.segments})
