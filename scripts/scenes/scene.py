@@ -100,6 +100,13 @@ def legal_order(scene: Scene, steps: Sequence[str], rng: np.random.Generator) ->
     return order
 
 
+def is_legal(scene: Scene, steps: Sequence[str]) -> bool:
+    """Tell whether no step comes before one that it waits for, of those that come at all."""
+    return not any(
+        set(scene.waits.get(step, ())) & set(steps[place:]) for place, step in enumerate(steps)
+    )
+
+
 def _correct(scene: Scene, steps: Sequence[str], rng: np.random.Generator) -> Plan:
     del rng
     usual = steps == [step for step in scene.steps if step in steps]
@@ -115,13 +122,23 @@ def _missing(scene: Scene, steps: list[str], rng: np.random.Generator) -> Plan:
 
 
 def _out_of_order(scene: Scene, steps: list[str], rng: np.random.Generator) -> Plan:
-    """Move one step past two or more others that are not optional."""
-    acts = [Act(step, True) for step in steps if step not in scene.optional]
-    start = int(rng.integers(len(acts)))
-    stops = [stop for stop in range(len(acts)) if abs(stop - start) >= 2]
-    stop = stops[rng.integers(len(stops))]
-    acts.insert(stop, acts.pop(start))
-    return Plan(tuple(acts), stop, "out_of_order")
+    """Move one step past two or more others, so that a step comes before one it waits for.
+
+    Optional steps are left out. Where no step waits for another, order is a habit, and any such
+    move breaks it.
+    """
+    needed = [step for step in steps if step not in scene.optional]
+    places = range(len(needed))
+    moves = [(start, stop) for start in places for stop in places if abs(stop - start) >= 2]
+    orders = {move: _moved(needed, *move) for move in moves}
+    wrong = [move for move in moves if not is_legal(scene, orders[move])] or moves
+    move = wrong[rng.integers(len(wrong))]
+    return Plan(tuple(Act(step, True) for step in orders[move]), move[1], "out_of_order")
+
+
+def _moved(steps: Sequence[str], start: int, stop: int) -> list[str]:
+    left = [*steps[:start], *steps[start + 1 :]]
+    return [*left[:stop], steps[start], *left[stop:]]
 
 
 def _extra(scene: Scene, steps: list[str], rng: np.random.Generator) -> Plan:

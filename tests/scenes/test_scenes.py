@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from scenes.registry import HELD_BACK, SCENES, TUNED_ON
-from scenes.scene import KINDS, Scene, legal_order, make_plan
+from scenes.scene import KINDS, Scene, is_legal, legal_order, make_plan
 
 FRAMES = 20
 """Calls per step."""
@@ -59,6 +59,17 @@ def test_no_step_of_a_legal_order_comes_before_one_it_waits_for(scene):
     for order in (list(scene.steps), drawn):
         for step, firsts in scene.waits.items():
             assert all(order.index(first) < order.index(step) for first in firsts)
+
+
+@each_scene
+def test_a_plan_out_of_order_breaks_what_a_step_waits_for(scene):
+    for seed in range(20):
+        plan = make_plan(scene, "out_of_order", np.random.default_rng(seed))
+        steps = [act.step for act in plan.acts]
+        assert sorted(steps) == sorted(set(scene.steps) - set(scene.optional))
+        assert steps != [step for step in scene.steps if step in steps]
+        if scene.waits:
+            assert not is_legal(scene, steps)
 
 
 @each_scene
