@@ -94,17 +94,20 @@ def legal_order(scene: Scene, steps: Sequence[str], rng: np.random.Generator) ->
     """Draw an order in which no step comes before one that it waits for."""
     left, order = list(steps), []
     while left:
-        ready = [s for s in left if not set(scene.waits.get(s, ())) & set(left)]
+        ready = [step for step in left if not _waits(scene, step, left)]
         order.append(ready[rng.integers(len(ready))])
         left.remove(order[-1])
     return order
 
 
 def is_legal(scene: Scene, steps: Sequence[str]) -> bool:
-    """Tell whether no step comes before one that it waits for, of those that come at all."""
-    return not any(
-        set(scene.waits.get(step, ())) & set(steps[place:]) for place, step in enumerate(steps)
-    )
+    """Tell whether no step comes before one that it waits for; steps left out do not count."""
+    return not any(_waits(scene, step, steps[place:]) for place, step in enumerate(steps))
+
+
+def _waits(scene: Scene, step: str, left: Sequence[str]) -> bool:
+    """Tell whether a step has to wait for one of those that are left."""
+    return not set(scene.waits.get(step, ())).isdisjoint(left)
 
 
 def _correct(scene: Scene, steps: Sequence[str], rng: np.random.Generator) -> Plan:
@@ -129,16 +132,22 @@ def _out_of_order(scene: Scene, steps: list[str], rng: np.random.Generator) -> P
     """
     needed = [step for step in steps if step not in scene.optional]
     places = range(len(needed))
-    moves = [(start, stop) for start in places for stop in places if abs(stop - start) >= 2]
-    orders = {move: _moved(needed, *move) for move in moves}
-    wrong = [move for move in moves if not is_legal(scene, orders[move])] or moves
-    move = wrong[rng.integers(len(wrong))]
-    return Plan(tuple(Act(step, True) for step in orders[move]), move[1], "out_of_order")
+    moves = [
+        (_moved(needed, start, stop), stop)
+        for start in places
+        for stop in places
+        if abs(stop - start) >= 2
+    ]
+    wrong = [(order, stop) for order, stop in moves if not is_legal(scene, order)] or moves
+    order, stop = wrong[rng.integers(len(wrong))]
+    return Plan(tuple(Act(step, True) for step in order), stop, "out_of_order")
 
 
 def _moved(steps: Sequence[str], start: int, stop: int) -> list[str]:
-    left = [*steps[:start], *steps[start + 1 :]]
-    return [*left[:stop], steps[start], *left[stop:]]
+    """Return the steps with the one at place `start` moved to place `stop`."""
+    order = list(steps)
+    order.insert(stop, order.pop(start))
+    return order
 
 
 def _extra(scene: Scene, steps: list[str], rng: np.random.Generator) -> Plan:

@@ -59,6 +59,7 @@ def test_no_step_of_a_legal_order_comes_before_one_it_waits_for(scene):
     for order in (list(scene.steps), drawn):
         for step, firsts in scene.waits.items():
             assert all(order.index(first) < order.index(step) for first in firsts)
+        assert is_legal(scene, order)
 
 
 @each_scene
@@ -70,6 +71,12 @@ def test_a_plan_out_of_order_breaks_what_a_step_waits_for(scene):
         assert steps != [step for step in scene.steps if step in steps]
         if scene.waits:
             assert not is_legal(scene, steps)
+            assert any(
+                steps.index(first) > steps.index(step)
+                for step, firsts in scene.waits.items()
+                for first in firsts
+                if {step, first} <= set(steps)
+            )
 
 
 @each_scene
