@@ -58,10 +58,14 @@ class Browser:
                 return dict(answer["result"])
 
     def open(self, path: Path) -> None:
-        """Open a page and wait until its script has run."""
+        """Open a page and wait until its script has run and it has been drawn.
+
+        What `content-visibility` leaves to be drawn when needed has no text before the first frame.
+        """
         self.errors.clear()
         self.send("Page.navigate", url=path.resolve().as_uri())
         self.wait("document.documentElement?.dataset.ready !== undefined")
+        self.run("new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
 
     def run(self, script: str) -> Any:
         """The value of a JavaScript expression."""

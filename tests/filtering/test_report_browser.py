@@ -146,6 +146,7 @@ def test_verdicts_become_a_weight_table(page: Browser, small: Path, tmp_path: Pa
     click(page, "#demo-1 [data-says=correct]")  # taken back
     assert page.run("document.getElementById('judged').textContent") == "1 confirmed, 2 overruled."
     page.open(small)  # they survive a reload
+    assert page.run("document.getElementById('judged').textContent") == "1 confirmed, 2 overruled."
     click(page, "#save-weights")
     rows = read_weight_table(downloaded(page, tmp_path, "weights.csv"))
     assert rows[1] == row_of(told[1])
