@@ -21,8 +21,10 @@ from policies.learners.store import DemonstrationStore, StoreShape
 from teasim.common.errors import ConfigError
 
 PROBED = 10
-"""Distance of the steps that are compared with the other demonstrations for the history [control
-steps]."""
+"""Least distance of the steps that are compared with the other demonstrations for the history
+[control steps]."""
+MOST_PROBES = 400
+"""Most steps that are compared: each of them is compared with all steps there are."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +78,10 @@ class Nearest:
 def _difference(store: DemonstrationStore) -> float:
     """Mean difference between targets and those of the nearest steps of other demonstrations."""
     edges, targets = store.edges, store.targets.numpy()
+    apart = max(PROBED, len(targets) // MOST_PROBES)
     missed = []
     for demo, (start, stop) in enumerate(pairwise(edges)):
-        for row in range(start, stop, PROBED):
+        for row in range(start, stop, apart):
             rows, costs = store.entries(store.low_dim[row].numpy())
             costs[demo] = np.inf
             if np.isfinite(costs).any():
