@@ -30,6 +30,8 @@ CLUSTERING = "clustering"
 """Name of the segmenter that needs videos alone."""
 AGREEMENT = "agreement"
 """Name of the segmenter that the score `moments` brings along."""
+TOLD = ("logged", "predictions")
+"""Names of the segmenters that read sub-tasks in place of finding them in videos."""
 
 
 @dataclass(frozen=True)
@@ -91,15 +93,15 @@ class FilterConfig(JudgingConfig):
     def for_source(self, source: Source) -> "FilterConfig":
         """Return these settings with `auto` replaced by what it stands for in a source.
 
-        Videos are judged by moments, and by the norm on sub-tasks that clustering finds in them;
-        with another segmenter by the norm alone; step lists without videos on the predictions that
-        are stored, or else on the logged labels.
+        Videos are judged by moments, and by the norm on sub-tasks that a segmenter finds in them;
+        on sub-tasks that are told by the norm alone; step lists without videos on the predictions
+        that are stored, or else on the logged labels.
         """
         score, segmenter = self.score, self.segmenter
         if score == AUTO and segmenter == AGREEMENT:
             score = MOMENTS
         elif score == AUTO:
-            alone = source.cameras and segmenter in (AUTO, CLUSTERING) and self._is_plain
+            alone = source.cameras and segmenter not in TOLD and self._is_plain
             score = COMBINED if alone else "norm"
         if segmenter == AUTO and score == MOMENTS:
             segmenter = AGREEMENT

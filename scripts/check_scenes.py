@@ -2,7 +2,8 @@
 
 The truth is read for counting only. Scenes that are kept back are judged with --held-back alone,
 when everything has been chosen. A folder that make_scenes.py did not write is made first. Pools of
-mistakes have 10 usual videos and some of one kind of mistake; clean and free-order pools 12 videos.
+mistakes have 10 usual videos and some of one kind of mistake; clean and free-order pools 12. Of an
+optional step either way is that of a third or more: what fewer do cannot be told from a mistake.
 With --tea pools of tea-making are judged too, with --scenes and no name after it they alone.
 """
 
@@ -27,6 +28,10 @@ from teasim.pool.views.part import Part
 
 GOOD, CLEAN = 10, 12
 """Usual videos of a pool with mistakes, and videos of a pool without."""
+USUAL_SHARE = 1 / 3
+"""Least share of a pool that does, or does without, an optional step."""
+MOST_TRIES = 1000
+"""Most pools drawn until one is found in which optional steps are usual."""
 NEAR = 1.5
 """How far a place that is named may lie from the true one [s]."""
 TEA_KINDS = {"seq_1": "usual", "legal": "free", "seq_2": "out_of_order", "seq_3": "missing"}
@@ -47,6 +52,8 @@ class Bank:
     """The cameras that are used."""
     kinds: np.ndarray
     """(n,) the kind of each."""
+    shown: np.ndarray
+    """(n, O) True for the optional steps of each."""
 
 
 class Drawn(NamedTuple):
@@ -86,14 +93,21 @@ def main() -> int:
         pool = make_bank(
             arguments.folder / name, SCENES[name], seed=0, workers=Workers(arguments.jobs)
         )
-        judge(bank_of(name, pool, pool.cameras, arguments), arguments)
+        optional = SCENES[name].optional
+        judge(bank_of(name, pool, pool.cameras, optional, arguments), arguments)
     for root in arguments.tea:
         pool = Pool.open(root)
-        judge(bank_of("tea", pool, arguments.cameras or pool.cameras, arguments), arguments)
+        judge(bank_of("tea", pool, arguments.cameras or pool.cameras, (), arguments), arguments)
     return 0
 
 
-def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.Namespace) -> Bank:
+def bank_of(
+    name: str,
+    pool: Pool,
+    cameras: Sequence[str],
+    optional: Sequence[str],
+    arguments: argparse.Namespace,
+) -> Bank:
     """Take the first videos of each kind of a pool."""
     kinds = np.array([kind_of(episode.record) for episode in pool.episodes])
     chosen = np.sort(
@@ -105,7 +119,9 @@ def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.N
         )
     )
     episodes = [pool.episodes[number] for number in chosen]
-    return Bank(name, pool, episodes, tuple(cameras), kinds[chosen])
+    shown = [{span.subtask for span in episode.spans()} for episode in episodes]
+    does = np.array([[step in steps for step in optional] for steps in shown], dtype=bool)
+    return Bank(name, pool, episodes, tuple(cameras), kinds[chosen], does)
 
 
 def kind_of(record) -> str:
@@ -117,7 +133,7 @@ def kind_of(record) -> str:
 def judge(bank: Bank, arguments: argparse.Namespace) -> None:
     """Print one line per kind of pool."""
     rows: dict[str, list[dict[str, float]]] = {}
-    for drawn in draw(bank.kinds, arguments):
+    for drawn in draw(bank, arguments):
         part = Part(bank.pool, [bank.episodes[v] for v in drawn.videos])
         config = FilterConfig(score=arguments.score, cameras=bank.cameras)
         fitted = DemoFilter(config).fit(part, workers=Workers(arguments.jobs))
@@ -134,21 +150,33 @@ def judge(bank: Bank, arguments: argparse.Namespace) -> None:
         print(f"{bank.name:10}{kind:18}{line}", flush=True)
 
 
-def draw(kinds: np.ndarray, arguments: argparse.Namespace) -> Iterator[Drawn]:
+def draw(bank: Bank, arguments: argparse.Namespace) -> Iterator[Drawn]:
     """Draw pools of every kind there are videos of."""
     rng = np.random.default_rng(arguments.seed)
-    usual = np.flatnonzero(kinds == "usual")
+    usual = np.flatnonzero(bank.kinds == "usual")
     for kind in MISTAKES:
-        those = np.flatnonzero(kinds == kind)
+        those = np.flatnonzero(bank.kinds == kind)
         for bad in (number for number in arguments.bad if number <= len(those)):
             for _ in range(arguments.pools):
-                videos = [*rng.permutation(usual)[:GOOD], *rng.permutation(those)[:bad]]
-                yield Drawn(kind, videos, kinds[videos] == kind)
+                videos = _balanced(bank, [(usual, GOOD), (those, bad)], rng)
+                yield Drawn(kind, videos, bank.kinds[videos] == kind)
     for kind in ("usual", "free"):
-        those = np.flatnonzero(kinds == kind)
+        those = np.flatnonzero(bank.kinds == kind)
         for _ in range(arguments.pools if len(those) >= CLEAN // 2 else 0):
-            videos = [*rng.permutation(those)[:CLEAN]]
+            videos = _balanced(bank, [(those, CLEAN)], rng)
             yield Drawn(kind, videos, np.zeros(len(videos), dtype=bool))
+
+
+def _balanced(
+    bank: Bank, parts: Sequence[tuple[np.ndarray, int]], rng: np.random.Generator
+) -> list[int]:
+    """Draw videos until either way of every optional step is that of enough of them."""
+    for _ in range(MOST_TRIES):
+        videos = [int(v) for those, count in parts for v in rng.permutation(those)[:count]]
+        does = bank.shown[videos].mean(axis=0)
+        if (np.minimum(does, 1 - does) >= USUAL_SHARE).all():
+            return videos
+    raise SystemExit(f"No pool of {bank.name} shows either way of its optional steps often enough.")
 
 
 def count(bank: Bank, drawn: Drawn, fitted: DemoFilter) -> dict[str, float]:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, Match
-from filtering.moments.evidence import TINY
 from filtering.moments.replaced import FOUND
 
 Array = NDArray[np.float64]
@@ -62,7 +61,7 @@ def agree(found: Counterparts) -> Agreement:
     row = _most_central(found)
     reference = found.references[row]
     matches = [match for match in found.there[row] if match is not None]
-    near = np.log(np.stack([match.near for match in matches]) + TINY)
+    near = np.stack([match.contested for match in matches])
     shown = near - np.median(near, axis=0) < FOUND
     jumps = np.stack([jumps_of(match) for match in matches]).mean(axis=0)
     borders = _borders(jumps)

@@ -1,8 +1,15 @@
 """Where each moment of a video has its counterpart in the other videos.
 
 Every video is compared with the references: all videos of a small pool, the most central ones of a
-large pool. One matrix of distances says both where the moments of the reference are found in the
+large pool. One matrix D of distances says both where the moments of the reference are found in the
 video, and where those of the video are found in the reference.
+
+A step that is left out has no counterpart, but there may be a step much like it, whose moments have
+a better counterpart of their own. A place u of the other video is therefore contested by the other
+moments t' of this one, those more than APART from t, and the counterpart of t is the place of the
+least
+
+    contested(t, u) = log D(t, u) + max(0, log D(t, u) - min over t' of log D(t', u)).
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,13 +30,21 @@ TRUSTED = 0.6
 """Share of a large pool, the most central videos, that references are drawn from."""
 ROUND_TRIP = 3
 """Most moments by which the counterpart of a counterpart may miss where it began."""
+APART = 6
+"""Moments from which on another moment contests a place: 1.2 s, less than a step lasts."""
+TINY = 1e-6
+"""Keeps logarithms finite where two videos are the same."""
 
 
 class Match(NamedTuple):
     """Where the moments of one video are found in another."""
 
     near: NDArray[np.float32]
-    """(n,) distance of the counterpart."""
+    """(n,) log distance of the most similar moment of the other video."""
+    nearest: NDArray[np.int64]
+    """(n,) that moment."""
+    contested: NDArray[np.float32]
+    """(n,) contested log distance of the counterpart, `near` or more."""
     at: NDArray[np.int64]
     """(n,) moment of the other video that is the counterpart."""
 
@@ -78,7 +93,7 @@ def compare(vectors: Sequence[Vectors], references: Sequence[int]) -> Counterpar
             if d == r or there[row][d] is not None:
                 continue
             distances = window_distances(vectors[r], vectors[d])
-            there[row][d], back[row][d] = _nearest(distances), _nearest(distances.T)
+            there[row][d], back[row][d] = find_match(distances), find_match(distances.T)
             if d in rows:
                 there[rows[d]][r], back[rows[d]][r] = back[row][d], there[row][d]
     return Counterparts(
@@ -109,9 +124,26 @@ def _spread(numbers: Sequence[int], count: int) -> list[int]:
     return [numbers[place] for place in places]
 
 
-def _nearest(distances: NDArray[np.float32]) -> Match:
-    at = distances.argmin(axis=1)
-    return Match(distances[np.arange(len(at)), at], at)
+def find_match(distances: NDArray[np.float32]) -> Match:
+    """Return the counterparts of the n moments of one video in another.
+
+    Args:
+        distances: (n, m), see `windows.window_distances`.
+    """
+    logs = np.log(distances + TINY)
+    contested = logs + np.maximum(logs - _claims(logs), 0.0)
+    rows, nearest, at = np.arange(len(logs)), logs.argmin(axis=1), contested.argmin(axis=1)
+    return Match(logs[rows, nearest], nearest, contested[rows, at], at)
+
+
+def _claims(logs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return (n, m): the least log distance to u of the moments more than APART from t."""
+    claims = np.full_like(logs, np.inf)
+    if len(logs) > APART + 1:
+        claims[APART + 1 :] = np.minimum.accumulate(logs)[: -APART - 1]
+        later = np.minimum.accumulate(logs[::-1])[::-1][APART + 1 :]
+        claims[: -APART - 1] = np.minimum(claims[: -APART - 1], later)
+    return claims
 
 
 def _differences(vectors: Sequence[Vectors], found: Counterparts) -> Iterator[Vectors]:

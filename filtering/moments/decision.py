@@ -34,11 +34,11 @@ SCALE: Mapping[str, float] = MappingProxyType(
     {"missing": 0.3, "order": 0.15, "extra": 0.36, "ineffective": 0.8}
 )
 """Evidence of each kind above which a video is flagged in a pool without scatter and variety.
-Chosen with FREE and SCATTER on two pools of every kind of each scene TUNED_ON and on twenty of
-tea-making, as a compromise between mistakes found and correct videos accused
+Chosen with FREE and SCATTER on two or three pools of every kind of each scene TUNED_ON and on
+twenty of tea-making, as a compromise between mistakes found and correct videos accused
 (`scripts/check_scenes.py`)."""
 FREE: Mapping[str, float] = MappingProxyType(
-    {"missing": 2.0, "order": 6.0, "extra": 2.0, "ineffective": 2.0}
+    {"missing": 2.0, "order": 6.0, "extra": 2.0, "ineffective": 6.0}
 )
 """How much wider SCALE is where another order moves a step past the whole video; where orders are
 free, alignments err too, so that it concerns all kinds."""
@@ -66,7 +66,7 @@ class Observed(NamedTuple):
     values: Mapping[str, Array]
     """Per kind (D,) its evidence against each demonstration."""
     variety: float
-    """How far steps move from one trusted demonstration to another, see `evidence.variety_of`."""
+    """How free the orders of the pool are, see `evidence.variety_of`; the same for all cameras."""
 
 
 def judge(

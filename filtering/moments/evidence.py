@@ -1,19 +1,21 @@
 """What counterparts say against a demonstration: a stretch is missing, out of order or extra.
 
-With near_rd(t) the distance of the counterpart in video d of moment t of reference r, at_rd(t) its
-place, moved_rd(t) the share of the video that it has passed, and Q_k the quantile 1 - VARIETY over
-the other references k, trusted ones alone:
+With c_rd(t) the contested log distance of the counterpart in video d of moment t of reference r,
+at_rd(t) its place, moved_rd(t) the share of the video that it has passed, Q_k the value that a
+share VARIETY of the trusted videos reach, and W_k the quantile WELL over all videos:
 
-    missing    log near_rd(t) - Q_k log near_rk(t)
+    missing    c_rd(t) - Q_k c_rk(t)
     order      moved_rd(t) - Q_k moved_rk(t)
-    extra      log near_dr(t) - median_k log near_rk(at_dr(t))         of moments t of d itself
+    extra      c_dr(t) - W_k c_rk(at_dr(t))                            of moments t of d itself
 
 Order counts only where the counterpart of the counterpart is the moment itself: rests look all
 alike. What a share VARIETY of the videos does, an optional step left out or another legal order, is
 thus never evidence. Each curve is summed up by the mean of its largest twelfth over t, because a
-step is a part of a video; missing and order by the median over the references, because a reference
-may be incorrect too; extra by the quantile SHARED. Missing and extra count less the more of the
-stretch is replaced, see `replaced`.
+step is a part of a video; missing and order by the median over the trusted references, because a
+reference may be incorrect too; extra by the quantile SHARED over all of them. Extra is also found
+from plain nearest moments in place of counterparts, and the larger value counts: a step done twice
+is seen in contested places alone, and one that nobody else does better in plain ones. Missing and
+extra count less the more of the stretch is replaced, see `replaced`.
 """
 
 from collections.abc import Sequence
@@ -22,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import ROUND_TRIP, Counterparts, returned
+from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, returned
 from filtering.moments.replaced import Side, replaced
 
 Array = NDArray[np.float64]
@@ -30,21 +32,25 @@ Trusted = NDArray[np.bool_]
 """(D,) True for the demonstrations that say what is usual."""
 
 VARIETY = 0.3
-"""Share of the trusted videos that makes a behaviour one of several usual ones."""
+"""Share of the trusted videos, rounded up, that makes a behaviour one of several usual ones."""
 RECOGNISED = 1.2
 """Largest log of how much farther than usual a counterpart may be for its place to count: what is
 done at another place is done among other things."""
 SHARED = 0.2
-"""Share of the trusted videos that makes a step one of the task: one that fewer show is extra."""
-MOST_PAIRS = 0.6
-"""Share of the pairs of demonstrations by which it is told how free orders are: in a pool of ten
-demonstrations of one order and four of another, 0.56 of the pairs agree."""
+"""Share of the videos that makes a step one of the task: one that fewer show is extra."""
+WELL = 0.25
+"""Share of the videos in which a moment is found best; what is extra is compared with them."""
+AGREED = (0.4, 0.5)
+"""Share of the others whose order a demonstration of the better half keeps, from which there is
+nearly an order of the task, and from which there is one. Ten demonstrations of one order keep that
+of 0.53 of the others beside eight of any orders; in pools of any legal order of the scenes TUNED_ON
+it is 0.47 or less, but where a scene has few legal orders."""
+FREEST = 0.9
+"""Quantile of the moves between demonstrations that tells how free orders are."""
 SMALL_MOVE = 0.02
 """Least move of a step that changes the order [length of a video]."""
 WORST = 12
 """The worst 1 / WORST of a video counts."""
-TINY = 1e-6
-"""Keeps logarithms finite where two videos are the same."""
 
 
 @dataclass(frozen=True)
@@ -72,27 +78,25 @@ class Evidence:
 
 
 def references_of(found: Counterparts, trusted: Trusted) -> "list[Reference]":
-    """Return what is usual, seen from each trusted reference.
+    """Return what is usual among the trusted, seen from each reference.
 
     Args:
         found: the counterparts.
         trusted: (D,) True for the demonstrations that say what is usual.
     """
-    return [Reference(found, row, trusted) for row in rows_of(found, trusted)]
+    return [Reference(found, row, trusted) for row in range(len(found.references))]
 
 
 def missing_order_extra(
-    found: Counterparts, references: "Sequence[Reference]"
+    references: "Sequence[Reference]", count: int
 ) -> tuple[Evidence, Evidence, Evidence]:
     """Return the evidence of the three kinds, in the order of the name.
 
     Args:
-        found: the counterparts.
         references: what is usual.
+        count: D, the number of demonstrations.
     """
-    results = [
-        _Comparison([r for r in references if r.number != d], d) for d in range(len(found.lengths))
-    ]
+    results = [_Comparison([r for r in references if r.number != d], d) for d in range(count)]
     return (
         _evidence([one.missing() for one in results]),
         _evidence([one.order() for one in results]),
@@ -101,24 +105,36 @@ def missing_order_extra(
 
 
 def moves_between(references: "Sequence[Reference]") -> Array:
-    """Return (P,): per pair of trusted demonstrations how far steps move [length of a video]."""
-    return np.array([far for reference in references for far in reference.moves()])
+    """Return (R, R): how far steps move between trusted references [length of a video].
+
+    NaN on the diagonal. Of the two that look at a pair, the one that sees less move counts.
+    """
+    trusted = [reference for reference in references if reference.trusted]
+    moves = np.full((len(trusted), len(trusted)), np.nan)
+    for row, reference in enumerate(trusted):
+        far = reference.moves()
+        for column, other in enumerate(trusted):
+            moves[row, column] = far.get(other.number, np.nan)
+    return np.fmin(moves, moves.T)
 
 
 def variety_of(moves: Array) -> float:
     """Return how far steps move from one demonstration to another [length of a video].
 
-    It is 0 while most pairs of demonstrations keep one order.
+    It is 0 where half of the demonstrations keep an order that half of the others keep too.
 
     Args:
-        moves: (P,) see `moves_between`.
+        moves: (R, R) see `moves_between`.
     """
-    return float(np.quantile(moves, MOST_PAIRS))
+    kept = np.sort(np.nanmean(np.where(np.isnan(moves), np.nan, moves < SMALL_MOVE), axis=1))
+    low, high = AGREED
+    free = np.clip((high - kept[len(kept) // 2]) / (high - low), 0.0, 1.0)
+    return float(free * np.nanquantile(moves, FREEST))
 
 
 def share_of_one_order(moves: Array) -> float:
-    """Return the share of the pairs of demonstrations that keep one order; see `variety_of`."""
-    return float((moves < SMALL_MOVE).mean())
+    """Return the share of the pairs of demonstrations that keep one order; see `moves_between`."""
+    return float((moves[~np.isnan(moves)] < SMALL_MOVE).mean())
 
 
 def rows_of(found: Counterparts, trusted: Trusted) -> list[int]:
@@ -166,53 +182,76 @@ def peak(curve: NDArray[np.floating]) -> tuple[int, int]:
     return start, stop
 
 
+def usual_of(curves: NDArray[np.floating]) -> Array:
+    """Return (n,): what a share VARIETY of the demonstrations reaches.
+
+    Args:
+        curves: (K, n) of those who say what is usual. A reference and the demonstration that is
+            judged are counted in, and do not reach it.
+    """
+    need = int(np.ceil(VARIETY * (len(curves) + 2))) - 1
+    return np.asarray(np.sort(curves, axis=0)[-max(need, 1)], dtype=np.float64)
+
+
 class Reference:
-    """What is usual among the trusted at each moment of one reference."""
+    """What is usual at each moment of one reference."""
 
     def __init__(self, found: Counterparts, row: int, trusted: Trusted) -> None:
         """Compare the trusted demonstrations with the reference of a row of `found`."""
         self.number = found.references[row]
-        self._matches, self._back = found.there[row], found.back[row]
-        others = [found.references[other] for other in rows_of(found, trusted)]
-        self._others = [k for k in others if k != self.number]
-        matches = [self._matches[k] for k in self._others]
-        self._nears = np.stack([np.log(m.near + TINY) for m in matches if m is not None])
-        self.usual: Array = np.median(self._nears, axis=0)
-        self._moved = np.stack([self._moved_in(k) for k in self._others])
-        self._rows = {k: row for row, k in enumerate(self._others)}
+        rows = rows_of(found, trusted)
+        self.trusted = row in rows
+        """Whether the reference says itself what is usual."""
+        self._there, self._back = found.there[row], found.back[row]
+        everybody = [one for one in self._there if one is not None]
+        self._well = tuple(
+            np.quantile(curves, WELL, axis=0)
+            for curves in ([m.near for m in everybody], [m.contested for m in everybody])
+        )
+        others = [k for other in rows if (k := found.references[other]) != self.number]
+        self._rows = {k: place for place, k in enumerate(others)}
+        self._lacks = np.stack([self._match(k).contested for k in others])
+        self._median = np.median(self._lacks, axis=0)
+        self._moved = np.stack([self._moved_in(k) for k in others])
 
     def departures(self, d: int) -> tuple[Array, Array]:
         """Return (n,), (n,): how much farther than usual, and how much displaced, d shows it."""
-        match = self._matches[d]
-        assert match is not None
-        kept = [row for row, k in enumerate(self._others) if k != d] or [0]
-        lack = np.log(match.near + TINY) - np.quantile(self._nears[kept], 1 - VARIETY, axis=0)
-        usual = np.quantile(self._moved[kept], 1 - VARIETY, axis=0)
+        kept = [place for k, place in self._rows.items() if k != d] or [0]
+        lack = self._match(d).contested - usual_of(self._lacks[kept])
         own = self._moved[self._rows[d]] if d in self._rows else self._moved_in(d)
-        return lack, np.maximum(own - usual, 0.0)
+        return lack, np.maximum(own - usual_of(self._moved[kept]), 0.0)
 
     def _moved_in(self, d: int) -> Array:
-        match, back = self._matches[d], self._back[d]
-        assert match is not None
+        match, back = self._match(d), self._back[d]
         assert back is not None
-        near = np.log(match.near + TINY) - self.usual < RECOGNISED
+        near = match.contested - self._median < RECOGNISED
         return moved(match.at, near & returned(match, back, ROUND_TRIP))
 
-    def moves(self) -> list[float]:
-        """Return how far steps move in each other trusted demonstration."""
-        return [worst(moved) for moved in self._moved]
+    def _match(self, d: int) -> Match:
+        match = self._there[d]
+        assert match is not None
+        return match
+
+    def moves(self) -> dict[int, float]:
+        """Return how far steps move in each other trusted demonstration, by its number."""
+        return {k: worst(self._moved[place]) for k, place in self._rows.items()}
 
     def at(self, d: int) -> NDArray[np.int64]:
         """Return (n,): the counterparts in d."""
-        match = self._matches[d]
-        assert match is not None
-        return match.at
+        return self._match(d).at
 
-    def back(self, d: int) -> Side:
-        """Return how much farther than usual the moments of d have their counterparts here."""
+    def strange(self, d: int) -> tuple[Side, Side]:
+        """Return how much worse than others the moments of d are found here.
+
+        First by nearest moments, then by counterparts.
+        """
         match = self._back[d]
         assert match is not None
-        return Side(np.log(match.near + TINY) - self.usual[match.at], match.at)
+        near, contested = self._well
+        return (
+            Side(np.asarray(match.near - near[match.nearest], np.float64), match.nearest),
+            Side(np.asarray(match.contested - contested[match.at], np.float64), match.at),
+        )
 
 
 _Result = tuple[float, Stretch, Stretch]
@@ -225,12 +264,15 @@ class _Comparison:
         self._references, self._d = references, d
         pairs = [reference.departures(d) for reference in references]
         self._lacks, self._shifts = [lack for lack, _ in pairs], [shift for _, shift in pairs]
-        self._sides = [reference.back(d) for reference in references]
-        self._curve: Array = np.quantile([side.curve for side in self._sides], SHARED, axis=0)
+        self._sides = list(zip(*(reference.strange(d) for reference in references), strict=True))
+        self._curves: list[Array] = [
+            np.quantile([side.curve for side in sides], SHARED, axis=0) for sides in self._sides
+        ]
 
     def missing(self) -> _Result:
+        filled = self._curves[0]
         values = [
-            less(worst(lack), replaced(Side(lack, r.at(self._d)), self._curve, *peak(lack)))
+            less(worst(lack), replaced(Side(lack, r.at(self._d)), filled, *peak(lack)))
             for r, lack in zip(self._references, self._lacks, strict=True)
         ]
         return self._middle(values, self._lacks)
@@ -239,25 +281,35 @@ class _Comparison:
         return self._middle([worst(shift) for shift in self._shifts], self._shifts)
 
     def extra(self) -> _Result:
-        start, stop = peak(self._curve)
-        shares = [
-            replaced(Side(self._curve, side.at), lack, start, stop)
-            for side, lack in zip(self._sides, self._lacks, strict=True)
+        results = [
+            self._strange(curve, sides)
+            for curve, sides in zip(self._curves, self._sides, strict=True)
         ]
-        value = less(worst(self._curve), float(np.median(shares)))
-        nearest = int(np.argmin([side.curve[start:stop].mean() for side in self._sides]))
-        places = self._sides[nearest].at[start:stop]
+        return max(results, key=lambda result: result[0])
+
+    def _strange(self, curve: Array, sides: Sequence[Side]) -> _Result:
+        start, stop = peak(curve)
+        shares = [
+            replaced(Side(curve, side.at), lack, start, stop)
+            for side, lack in zip(sides, self._lacks, strict=True)
+        ]
+        value = less(worst(curve), float(np.median(shares)))
+        nearest = int(np.argmin([side.curve[start:stop].mean() for side in sides]))
+        places = sides[nearest].at[start:stop]
         other = Stretch(self._references[nearest].number, int(places.min()), int(places.max()) + 1)
         return value, Stretch(self._d, start, stop), other
 
     def _middle(self, values: Sequence[float], curves: Sequence[Array]) -> _Result:
-        """Sum up the values of all references; the places are those of the median one."""
-        chosen = int(np.argsort(values, kind="stable")[len(values) // 2])
+        """Sum up the values of the trusted references; the places are those of the median one."""
+        trusted = [n for n, reference in enumerate(self._references) if reference.trusted]
+        ordered = sorted(trusted or range(len(values)), key=lambda number: values[number])
+        chosen = ordered[len(ordered) // 2]
         start, stop = peak(curves[chosen])
         places = np.sort(self._references[chosen].at(self._d)[start:stop])
         low, high = np.quantile(places, (0.25, 0.75)).astype(int)
         own = Stretch(self._d, int(low), int(high) + 1)
-        return float(np.median(values)), own, Stretch(self._references[chosen].number, start, stop)
+        middle = float(np.median([values[number] for number in ordered]))
+        return middle, own, Stretch(self._references[chosen].number, start, stop)
 
 
 def less(value: float, share: float) -> float:

@@ -153,7 +153,10 @@ def gather(
     trusted: Trusted,
 ) -> dict[str, Evidence]:
     """Return the evidence of every kind that one camera gives, measured by the trusted."""
-    kinds = (*missing_order_extra(found, references), ineffective(found, views, trusted))
+    kinds = (
+        *missing_order_extra(references, len(found.lengths)),
+        ineffective(found, views, trusted),
+    )
     return dict(zip(KINDS, kinds, strict=True))
 
 
@@ -168,16 +171,19 @@ def _judged(
     one_order: dict[str, float] = {}  # known since the first round, which trusts everybody
 
     def values(trusted: Trusted) -> list[Observed]:
-        seen = []
+        moves = {}
         for camera in cameras:
             references = references_of(found[camera], trusted)
             evidence[camera] = gather(found[camera], references, views[camera], trusted)
-            moves = moves_between(references)
-            if trusted.all():
-                one_order[camera] = share_of_one_order(moves)
-            by_kind = {kind: evidence[camera][kind].values for kind in KINDS}
-            seen.append(Observed(by_kind, variety_of(moves)))
-        return seen
+            moves[camera] = moves_between(references)
+        if trusted.all():
+            one_order.update({c: share_of_one_order(far) for c, far in moves.items()})
+        # Orders are free or not whoever looks; a camera that misses some steps sees less of it.
+        variety = max(variety_of(far) for far in moves.values())
+        return [
+            Observed({kind: evidence[camera][kind].values for kind in KINDS}, variety)
+            for camera in cameras
+        ]
 
     count = len(next(iter(found.values())).lengths)
     _, each = judge(values, count)

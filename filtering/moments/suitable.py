@@ -124,8 +124,9 @@ def shared_structure(found: Counterparts) -> float:
         for there, returned in zip(row, back, strict=True):
             if there is None or returned is None:
                 continue
-            count = len(there.at)
-            missed = np.abs(returned.at[there.at] - np.arange(count))
+            count = len(there.nearest)
+            # Places that are contested would make even noise agree.
+            missed = np.abs(returned.nearest[there.nearest] - np.arange(count))
             usual = _share_near(count)
             shares.append(((missed <= ROUND_TRIP).mean() - usual) / (1 - usual))
     return float(np.median(shares))

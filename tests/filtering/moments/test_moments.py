@@ -3,10 +3,16 @@ import pytest
 
 from filtering.judging.moments import Timeline, judge_moments
 from filtering.moments.agreement import agree
-from filtering.moments.counterparts import choose_references, compare, find_counterparts
+from filtering.moments.counterparts import (
+    APART,
+    choose_references,
+    compare,
+    find_counterparts,
+    find_match,
+)
 from filtering.moments.decision import KINDS, Observed, exceedances, judge
 from filtering.moments.effects import states_of, usual_change
-from filtering.moments.evidence import moved, peak, worst
+from filtering.moments.evidence import moved, peak, usual_of, variety_of, worst
 from filtering.moments.replaced import Side, replaced
 from filtering.moments.score import score_moments
 from filtering.moments.suitable import comparable
@@ -52,6 +58,43 @@ def test_a_video_is_its_own_counterpart():
     match = found.there[0][1]
     assert match is not None
     assert np.array_equal(match.at, np.arange(len(video[0])))
+
+
+def test_a_place_belongs_to_the_moment_that_fits_it_best():
+    # Two steps look alike; the second one is left out of the other video.
+    distances = np.full((40, 20), 8.0, dtype=np.float32)
+    distances[np.arange(20), np.arange(20)] = 1.0
+    distances[np.arange(20, 40), np.arange(20)] = 2.0
+    found = find_match(distances)
+    assert np.array_equal(found.nearest, np.tile(np.arange(20), 2))
+    assert np.allclose(found.near[20:], np.log(2.0), atol=1e-5)
+    assert np.allclose(found.contested[:20], 0.0, atol=1e-5)
+    assert np.allclose(found.contested[20:], 2 * np.log(2.0), atol=1e-5)
+
+
+def test_moments_close_by_do_not_contest_a_place():
+    distances = np.full((APART + 1, 1), 2.0, dtype=np.float32)
+    distances[0] = 1.0
+    found = find_match(distances)
+    assert np.array_equal(found.contested, found.near)
+
+
+def test_what_three_of_ten_videos_do_is_usual():
+    # The reference and the judged one are counted in, so that eight others are left.
+    others = np.array([[0.0]] * 6 + [[1.0]] * 2)
+    assert usual_of(others) == 1.0
+    others[-1] = 0.0
+    assert usual_of(others) == 0.0
+
+
+def test_orders_are_free_where_no_order_is_kept_by_half():
+    def moves(orders):
+        far = (orders[:, None] != orders[None, :]).astype(float)
+        np.fill_diagonal(far, np.nan)
+        return far
+
+    assert variety_of(moves(np.r_[np.zeros(10), np.arange(1, 9)])) == 0.0
+    assert variety_of(moves(np.repeat(np.arange(6), 2))) == 1.0
 
 
 def test_a_missing_step_is_found_at_its_place(with_a_step_missing):
