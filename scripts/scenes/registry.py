@@ -1,20 +1,8 @@
 """The scenes. Some of them are kept back: no choice is made by what a filter does on them."""
 
-from scenes import (
-    assembly,
-    bench,
-    conveyor,
-    drawers,
-    hands,
-    lab,
-    panel,
-    pour,
-    salad,
-    squares,
-    stack,
-    tabletop,
-)
+from scenes import bench, conveyor, hands, panel, pour, squares, stack, tabletop
 from scenes.held_back import garden, parcel, supper
+from scenes.looked_at import assembly, drawers, lab, salad
 from scenes.scene import Scene
 
 TUNED_ON: tuple[Scene, ...] = (
