@@ -158,25 +158,28 @@ def draw(bank: Bank, arguments: argparse.Namespace) -> Iterator[Drawn]:
         those = np.flatnonzero(bank.kinds == kind)
         for bad in (number for number in arguments.bad if number <= len(those)):
             for _ in range(arguments.pools):
-                videos = _balanced(bank, [(usual, GOOD), (those, bad)], rng)
-                yield Drawn(kind, videos, bank.kinds[videos] == kind)
+                if videos := _balanced(bank, [(usual, GOOD), (those, bad)], rng):
+                    yield Drawn(kind, videos, bank.kinds[videos] == kind)
     for kind in ("usual", "free"):
         those = np.flatnonzero(bank.kinds == kind)
         for _ in range(arguments.pools if len(those) >= CLEAN // 2 else 0):
-            videos = _balanced(bank, [(those, CLEAN)], rng)
-            yield Drawn(kind, videos, np.zeros(len(videos), dtype=bool))
+            if videos := _balanced(bank, [(those, CLEAN)], rng):
+                yield Drawn(kind, videos, np.zeros(len(videos), dtype=bool))
 
 
 def _balanced(
     bank: Bank, parts: Sequence[tuple[np.ndarray, int]], rng: np.random.Generator
 ) -> list[int]:
-    """Draw videos until either way of every optional step is that of enough of them."""
+    """Draw videos until either way of every optional step is that of enough of them.
+
+    Empty where there are no such videos: scenes with few legal orders have few free ones.
+    """
     for _ in range(MOST_TRIES):
         videos = [int(v) for those, count in parts for v in rng.permutation(those)[:count]]
         does = bank.shown[videos].mean(axis=0)
         if (np.minimum(does, 1 - does) >= USUAL_SHARE).all():
             return videos
-    raise SystemExit(f"No pool of {bank.name} shows either way of its optional steps often enough.")
+    return []
 
 
 def count(bank: Bank, drawn: Drawn, fitted: DemoFilter) -> dict[str, float]:
