@@ -5,7 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from policies.checkpoint import load_policy
+from policies.foreign import policy_at
 from policies.learners.motion_policy import JointPolicy
 from policies.learners.subtask_policy import SubtaskPolicy
 from policies.play.comparison import compare, comparison_json, comparison_text
@@ -30,7 +30,7 @@ def run_evaluation(settings: EvaluateSettings) -> int:
     """
     for path in (settings.json, settings.junit):
         check_file(path)
-    policy = load_policy(settings.run)
+    policy = policy_at(settings.run)
     if isinstance(policy, JointPolicy):
         return _evaluate_joints(policy, settings)
     return _evaluate_subtasks(policy, settings)
@@ -65,7 +65,7 @@ def _evaluate_subtasks(policy: SubtaskPolicy, settings: EvaluateSettings) -> int
 
 def _load_rival(run: Path) -> SubtaskPolicy:
     """Load a policy that a policy over sub-tasks can be compared with."""
-    policy = load_policy(run)
+    policy = policy_at(run)
     if isinstance(policy, JointPolicy):
         raise ConfigError(
             f"'{run}' holds a policy of the joint level; a comparison needs two over sub-tasks."

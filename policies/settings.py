@@ -37,6 +37,9 @@ class EnvironmentConfig:
     TeaMaking-v0 for a policy over joints."""
     quality: str = "fast"
     """Rendering quality, fast or nice; use that of the pool."""
+    look: str = "fixed"
+    """Look of the station, for a policy that sees pictures: fixed, or random, where light, colours,
+    camera poses and distractors differ from episode to episode; use that of the pool."""
     randomize: bool = True
     """Move and turn the objects on the table from episode to episode."""
     max_actions: int | None = 14
@@ -78,11 +81,11 @@ class EvaluateSettings(EvaluationConfig):
     """Run a trained policy in the environment and score it."""
 
     run: tyro.conf.Positional[Path]
-    """Folder of the policy."""
+    """Folder of the policy, or module:attribute of a policy of another program."""
     min_policy_accuracy: float | None = None
     """Least policy accuracy [%] (strict, deterministic decisions); below it the exit code is 1."""
     against: Path | None = None
-    """Folder of another policy, compared with the first on the same episodes."""
+    """Another policy, compared with the first on the same episodes."""
     json: Path | None = None
     """File for all scores and episodes."""
     junit: Path | None = None

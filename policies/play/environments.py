@@ -37,6 +37,8 @@ def make_environment(
         sight["render_mode"] = "rgb_array"
     if len(sight) > 1:
         sight["quality"] = config.quality  # of pictures, which some environments do not have
+        if config.look != "fixed":
+            sight["look"] = config.look
     if config.max_actions is not None:
         sight["max_actions"] = config.max_actions
     env_id = config.env_id or SUBTASK_ENVIRONMENT

@@ -9,7 +9,7 @@ SMALL = {"steps": 40, "width": 16, "blocks": 1, "batch": 8, "learning_rate": 1e-
 QUICK = {
     "act": SMALL | {"chunk": 3},
     "bc@joint": SMALL,
-    "bc-rnn@joint": SMALL | {"chunk": 2, "window": 4, "hidden": 8},
+    "bc-rnn@joint": SMALL | {"chunk": 2, "horizon": 4, "hidden": 8},
     "nearest": {"chunk": 3},
     "bcnd": {"members": 2, "rounds": 2},
     "demodice": {"experts": (0, 1), "ratio_steps": 60},

@@ -191,7 +191,7 @@ def test_goals_that_were_never_shown_are_reached(row, batch):
     """The answer is known: every step halves the distance to the goal."""
     random = np.random.default_rng(0)
     settings = {"steps": 400, "width": 32, "blocks": 1, "batch": batch, "learning_rate": 5e-3}
-    settings |= {"hidden": 8, "window": 6} if row == "bc-rnn@joint" else {}
+    settings |= {"hidden": 8, "horizon": 6} if row == "bc-rnn@joint" else {}
     learner = kind_of(row).make(**settings).fit(ways(60, random), np.ones(60))
     goals, here, state = random.uniform(-0.8, 0.8, (20, 2)), np.zeros((20, 2)), None
     for step in range(25):
@@ -214,3 +214,22 @@ def test_a_plan_holds_the_last_target_of_a_demonstration(motions):
     assert planned.shape == (1, 4, 2)
     wanted = rows.targets[last[0]] - rows.measured[last[0]]
     np.testing.assert_array_equal(planned[0], np.tile(wanted, (4, 1)))
+
+
+def test_what_is_remembered_is_cleared_after_the_horizon():
+    """From then on, a recurrent policy acts as if the episode had begun there."""
+    random = np.random.default_rng(0)
+    settings = {"steps": 50, "width": 32, "blocks": 1, "hidden": 8, "horizon": 3, "ensemble": 0.0}
+    policy = kind_of("bc-rnn@joint").make(**settings).fit(ways(20, random), np.ones(20)).policy_
+    seen = [random.uniform(-0.8, 0.8, (2, 2)) for _ in range(5)]
+
+    def run(first):
+        state, targets = None, []
+        for here, goal in seen[first:]:
+            observation = {"agent_pos": here, "environment_state": goal}
+            target, state = policy.predict(observation, state)
+            targets.append(target)
+        return targets
+
+    assert np.allclose(run(0)[3:], run(3), atol=1e-6)
+    assert not np.allclose(run(0)[2], run(2)[0], atol=1e-6)

@@ -173,7 +173,7 @@ SIZES = "A learner of joint targets needs width >= 1, blocks >= 0 and 0 <= avera
         ("bc@joint", {"emphasis": 0.0}, PLANS),
         ("act", {"averaging": 1.0}, SIZES),
         ("bc-rnn@joint", {"width": 0}, SIZES),
-        ("bc-rnn@joint", {"window": 0}, "bc-rnn needs hidden >= 1 and window >= 1."),
+        ("bc-rnn@joint", {"horizon": 0}, "bc-rnn needs hidden >= 1 and horizon >= 1."),
         ("nearest", {"chunk": 0}, "chunk is 0; choose 1 or more."),
         ("bcnd", {"members": 0}, "bcnd needs members >= 1 and rounds >= 1."),
         ("demodice", {"gamma": 1.0}, "gamma is 1.0; choose more than 0 and less than 1."),

@@ -1,6 +1,7 @@
-"""A network that plans joint targets from all states of an episode."""
+"""A network that plans joint targets from the last states of an episode."""
 
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import ClassVar
 
 import torch
@@ -10,16 +11,30 @@ from policies.learners.joints.networks import HiddenState, Normaliser, PlanShape
 from policies.learners.joints.steps.switches import MOST_VALUES
 
 
+@dataclass(frozen=True)
+class Memory:
+    """What is remembered from one control step to the next."""
+
+    hidden: int
+    """H, size of the LSTM."""
+    horizon: int
+    """Control steps after which it is cleared."""
+
+
 class RecurrentPlanNetwork(nn.Module):
     """An LSTM beside the state; a residual network plans a chunk from both."""
 
     kind: ClassVar[str] = "recurrent chunks"
     values: Tensor
 
-    def __init__(self, shape: PlanShape, seed: int, ensemble: float, hidden: int) -> None:
-        """Draw the initial weights from a generator of their own, seeded with `seed`."""
+    def __init__(self, shape: PlanShape, seed: int, ensemble: float, **memory: int) -> None:
+        """Draw the initial weights from a generator of their own, seeded with `seed`.
+
+        `memory` has the fields of `Memory`.
+        """
         super().__init__()
-        self.shape, self.ensemble, self.hidden = shape, ensemble, hidden
+        self.shape, self.ensemble, self.remembered = shape, ensemble, Memory(**memory)
+        hidden = self.remembered.hidden
         random = torch.Generator().manual_seed(seed)
         self.normaliser = Normaliser(shape)
         self.register_buffer("values", torch.full((shape.actions, MOST_VALUES), torch.nan))
@@ -32,13 +47,13 @@ class RecurrentPlanNetwork(nn.Module):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Weight of earlier plans, and size of the hidden state."""
-        return {"ensemble": self.ensemble, "hidden": self.hidden}
+        """Weight of earlier plans, and what is remembered."""
+        return {"ensemble": self.ensemble, **asdict(self.remembered)}
 
     @property
     def memory(self) -> tuple[int, ...]:
-        """Sizes of the hidden state: output and cell."""
-        return self.hidden, self.hidden
+        """Sizes of the hidden state: output, cell, and the steps since it was cleared."""
+        return self.remembered.hidden, self.remembered.hidden, 1
 
     def forward(
         self, inputs: Tensor, hidden: HiddenState | None
@@ -66,5 +81,10 @@ class RecurrentPlanNetwork(nn.Module):
     ) -> tuple[Tensor, Tensor, HiddenState]:
         """Return logits of the sub-tasks (n, E), targets (n, K, J), and the next hidden state."""
         given = self.normaliser.inputs(inputs)[:, None]
+        taken = given.new_zeros(len(given), 1)
+        if hidden is not None:
+            goes_on = hidden[-1] < self.remembered.horizon
+            taken = hidden[-1] * goes_on
+            hidden = tuple(part * goes_on for part in hidden[:2])
         logits, planned, after = self(given, hidden)
-        return logits[:, 0], self.normaliser.restored(planned[:, 0]), after
+        return logits[:, 0], self.normaliser.restored(planned[:, 0]), (*after, taken + 1)
