@@ -137,10 +137,9 @@ def train_policies(
 ) -> dict[str, SubtaskPolicy]:
     """Clone behaviour from each of the training `sets` and save the policies.
 
-    The policies are recurrent and see the state, so they differ by the demonstrations they learn
-    from and not by what is visible in a picture.
+    The policies are recurrent, and see the pictures of all cameras and the joint positions.
     """
-    samples = load_decisions(pool, DemosConfig(observe="state"), workers=settings.workers)
+    samples = load_decisions(pool, DemosConfig("pixels_agent_pos"), workers=settings.workers)
     config = BCRNNConfig(seed=settings.seed)
     fit = partial(_fit, samples, config)
     learned = parallel.run(

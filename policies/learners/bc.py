@@ -20,8 +20,9 @@ from policies.learners.networks import DecisionNetwork, NetworkShape
 from policies.learners.subtask_policy import SubtaskPolicy
 from teasim.common.errors import ConfigError
 
-STEPS_WITH_PICTURES = 120
-"""Default number of gradient steps with feature maps in several views."""
+STEPS_WITH_PICTURES = 600
+"""Default number of gradient steps with feature maps in several views: after 120, one sampled
+decision in fifty is another than the likeliest one (docs/results.md)."""
 STEPS_FROM_STATE = 500
 """Default number of gradient steps from the state alone, which needs more and cheaper steps."""
 
@@ -33,7 +34,7 @@ class BCConfig:
     bottleneck: int = 32
     """Channels per camera after the 1x1 bottleneck."""
     steps: int | None = None
-    """Gradient steps, each on all decisions in one of their views; None: 120 with pictures, 500
+    """Gradient steps, each on all decisions in one of their views; None: 600 with pictures, 500
     from the state alone."""
     learning_rate: float = 6e-3
     """Step size of AdamW."""
