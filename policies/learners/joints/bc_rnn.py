@@ -33,7 +33,7 @@ class JointBCRNNConfig(PlanConfig):
     """Windows per sub-task in a gradient step."""
     horizon: int = 10
     """Control steps after which the memory is cleared; Mandlekar et al. take 10."""
-    hidden: int = 256
+    hidden: int = 64
     """H, size of the LSTM; Mandlekar et al. take two layers of 400."""
 
     @property
@@ -70,17 +70,25 @@ class JointBCRNN:
         memory = asdict(config.memory)
         network = RecurrentPlanNetwork(shape, config.seed, config.ensemble, **memory)
         set_scales(network, rows, draws)
+        if subtasks > 1:
+            network.relevant.copy_(torch.from_numpy(rows.relevant))
 
         def loss(_: int) -> Tensor:
-            chosen, counts = windows(rows, draws.batch().ravel(), config.horizon)
-            given = torch.from_numpy(rows.given[chosen.ravel()]).view(*chosen.shape, -1)
-            logits, planned, _ = network(network.normaliser.inputs(given), None)
+            first = draws.batch()
+            chosen, counts = windows(rows, first.ravel(), config.horizon)
+            given = network.normaliser.inputs(torch.from_numpy(rows.given[chosen]))
+            read = network.read(given, None)[0]
+            parts = (
+                given.view(subtasks, -1, shape.inputs),
+                read.reshape(subtasks, -1, config.hidden),
+            )
+            planned = network(*parts).flatten(0, 1)
             wanted = torch.from_numpy(rows.planned(chosen.ravel(), config.chunk))
-            wanted = network.normaliser.targets(wanted).view_as(planned)
-            missed = (planned - wanted).abs().mean(dim=(2, 3))
-            labels = torch.from_numpy(rows.subtasks[chosen])
-            told = cross_entropy(logits.transpose(1, 2), labels, reduction="none")
-            return ((missed + told) * counts).sum() / counts.sum()
+            missed = (planned - network.normaliser.targets(wanted)).abs().mean(dim=(1, 2))
+            logits = network.tell(given.flatten(0, 1), read.flatten(0, 1))
+            labels = torch.from_numpy(rows.subtasks[chosen.ravel()])
+            told = cross_entropy(logits, labels, reduction="none")
+            return ((missed + told) * counts.ravel()).sum() / counts.sum()
 
         self.history_ = descend(network, loss, config)
         self.policy_ = ChunkPolicy(network, samples.spec, samples.action_names)
