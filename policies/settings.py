@@ -78,11 +78,11 @@ class EvaluateSettings(EvaluationConfig):
     """Run a trained policy in the environment and score it."""
 
     run: tyro.conf.Positional[Path]
-    """Folder of the policy."""
+    """Folder of the policy, or MODULE:NAME of any object or class with the method `predict`."""
     min_policy_accuracy: float | None = None
     """Least policy accuracy [%] (strict, deterministic decisions); below it the exit code is 1."""
     against: Path | None = None
-    """Folder of another policy, compared with the first on the same episodes."""
+    """Another policy, compared with the first on the same episodes."""
     json: Path | None = None
     """File for all scores and episodes."""
     junit: Path | None = None
