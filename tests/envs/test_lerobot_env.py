@@ -106,6 +106,14 @@ def test_a_policy_of_a_pool_finds_all_its_features_by_name(build):
     assert set(config.cameras) < set(CAMERAS)
 
 
+def test_features_of_a_stored_configuration_are_replaced(plugin):
+    kind = fake_lerobot.EnvConfig.choices["teasim"]
+    stored, asked = kind(), kind(obs_type="state")
+    again = kind(obs_type="state", features=stored.features, features_map=stored.features_map)
+    assert (again.features, again.features_map) == (asked.features, asked.features_map)
+    assert set(asked.features) == {"action", "agent_pos", "environment_state"}
+
+
 def test_the_default_pictures_have_the_size_of_a_pools(plugin):
     config = fake_lerobot.EnvConfig.choices["teasim"]()
     header = pool_header(GenerateConfig())

@@ -50,7 +50,8 @@ class TeasimEnv(EnvConfig):
     """Names of the features in LeRobot's data sets; filled in."""
 
     def __post_init__(self) -> None:
-        """Fill in the features."""
+        """Fill in the features; those of a stored configuration may be of other settings."""
+        self.features, self.features_map = {}, {}
         size = (self.observation_height, self.observation_width, 3)
         joints, station = (len(STATE_NAMES),), (len(ENVIRONMENT_STATE_NAMES),)
         self._add(ACTION, ACTION, FeatureType.ACTION, joints)
