@@ -23,6 +23,7 @@ EXAMPLES = {
     "evaluate": (
         "teasim evaluate policy --episodes 20 --json scores.json",
         "teasim evaluate policy --against other_policy --video videos",
+        "teasim evaluate my_module:MyPolicy --episodes 20",
     ),
     "ablate": (
         "teasim ablate plan.toml -o results",

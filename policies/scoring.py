@@ -5,7 +5,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from policies.foreign import policy_at
+from policies.checkpoint import AnyPolicy, load_policy
+from policies.foreign import ForeignPolicy, adopt, is_named
 from policies.learners.motion_policy import JointPolicy
 from policies.learners.subtask_policy import SubtaskPolicy
 from policies.play.comparison import compare, comparison_json, comparison_text
@@ -19,21 +20,27 @@ from teasim.common.files import write_json
 
 
 def run_evaluation(settings: EvaluateSettings) -> int:
-    """Evaluate the policy in the folder `settings.run` and print its scores.
+    """Evaluate the policy `settings.run` and print its scores.
 
     Returns:
         0, or 1 if the policy accuracy is below `settings.min_policy_accuracy`.
 
     Raises:
         CheckpointError: the folder holds no policy, or one for another environment.
-        ConfigError: a setting does not fit the policy, or the environment cannot be made.
+        ConfigError: a setting does not fit the policy, the environment cannot be made, or the
+            policy named in place of a folder is none.
     """
     for path in (settings.json, settings.junit):
         check_file(path)
-    policy = policy_at(settings.run)
+    policy = _find_policy(settings.run, settings)
     if isinstance(policy, JointPolicy):
         return _evaluate_joints(policy, settings)
     return _evaluate_subtasks(policy, settings)
+
+
+def _find_policy(run: Path, settings: EvaluateSettings) -> AnyPolicy | ForeignPolicy:
+    """Return the policy in the folder `run`, or the one that MODULE:NAME names."""
+    return adopt(str(run), settings.environment) if is_named(run) else load_policy(run)
 
 
 def check_file(path: Path | None) -> None:
@@ -42,10 +49,10 @@ def check_file(path: Path | None) -> None:
         raise ConfigError(f"The output file '{path}' is a folder; name a file in it.")
 
 
-def _evaluate_subtasks(policy: SubtaskPolicy, settings: EvaluateSettings) -> int:
+def _evaluate_subtasks(policy: SubtaskPolicy | ForeignPolicy, settings: EvaluateSettings) -> int:
     minimum = settings.min_policy_accuracy
     bar = None if minimum is None else Bar(minimum)
-    rivals = [] if settings.against is None else [_load_rival(settings.against)]
+    rivals = [] if settings.against is None else [_find_rival(settings.against, settings)]
     scores, *others = evaluate_all([policy, *rivals], settings, workers=settings.workers)
     record = _record(settings, "subtask")
     print(summary(scores))
@@ -63,9 +70,9 @@ def _evaluate_subtasks(policy: SubtaskPolicy, settings: EvaluateSettings) -> int
     return 1
 
 
-def _load_rival(run: Path) -> SubtaskPolicy:
-    """Load a policy that a policy over sub-tasks can be compared with."""
-    policy = policy_at(run)
+def _find_rival(run: Path, settings: EvaluateSettings) -> SubtaskPolicy | ForeignPolicy:
+    """Return a policy that a policy over sub-tasks can be compared with."""
+    policy = _find_policy(run, settings)
     if isinstance(policy, JointPolicy):
         raise ConfigError(
             f"'{run}' holds a policy of the joint level; a comparison needs two over sub-tasks."

@@ -81,7 +81,7 @@ class EvaluateSettings(EvaluationConfig):
     """Run a trained policy in the environment and score it."""
 
     run: tyro.conf.Positional[Path]
-    """Folder of the policy, or module:attribute of a policy of another program."""
+    """Folder of the policy, or MODULE:NAME of any object or class with the method `predict`."""
     min_policy_accuracy: float | None = None
     """Least policy accuracy [%] (strict, deterministic decisions); below it the exit code is 1."""
     against: Path | None = None

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from policies.foreign import policy_at
 from teasim.cli.main import main as teasim
-from teasim.common.errors import ConfigError
 from teasim.pool import Pool
 from teasim.pool.weight_table import read_weight_table
 from tests.toy_pool import SEQ_1, make_toy_pool
@@ -64,17 +62,3 @@ def test_a_policy_of_your_own_is_evaluated(monkeypatch, capsys):
     options = ["--episodes", "1", "--jobs", "1"]
     assert teasim(["evaluate", "own_policy:Recipe", *options]) == 0
     assert "policy accuracy  100.0 %" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("nowhere_at_all:Policy", "Cannot import the policy 'nowhere_at_all:Policy': "),
-        ("json:nothing", "Cannot import the policy 'json:nothing': "),
-        ("json:JSONDecoder", "'json:JSONDecoder' is no policy: it needs predict, spec, "),
-    ],
-)
-def test_what_is_no_policy_is_refused(name, message):
-    with pytest.raises(ConfigError) as error:
-        policy_at(Path(name))
-    assert str(error.value).startswith(message)

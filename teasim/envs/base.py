@@ -69,7 +69,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         """Build the station; OpenGL starts with the first picture.
 
         Args:
-            obs_type: state, pixels or pixels_agent_pos.
+            obs_type: state, pixels, pixels_agent_pos or pixels_state.
             cameras: Cameras of the `pixels` observation; `render()` uses the first one.
             width: Width of the pictures [pixels].
             height: Height of the pictures [pixels].

@@ -10,8 +10,8 @@ from teasim.common.errors import ConfigError
 from teasim.render import StationRenderer
 from teasim.world.simulation import ENVIRONMENT_STATE_NAMES, Simulation
 
-OBS_TYPES = ("state", "pixels", "pixels_agent_pos")
-"""What observations can consist of."""
+OBS_TYPES = ("state", "pixels", "pixels_agent_pos", "pixels_state")
+"""What observations can consist of; `pixels_state` is all that a pool logs."""
 LARGEST = 1000.0
 """Bound of every state value [rad, m, ml, g]; all of them stay far below it."""
 
@@ -35,9 +35,9 @@ def observation_space(
     parts: dict[str, spaces.Space[Any]] = {}
     if obs_type != "pixels":
         parts["agent_pos"] = _vector(len(names))
-    if obs_type == "state":
+    if obs_type.endswith("state"):
         parts["environment_state"] = _vector(len(ENVIRONMENT_STATE_NAMES))
-    else:
+    if obs_type.startswith("pixels"):
         picture = spaces.Box(0, 255, (*size, 3), np.uint8)
         # As in PushT and ALOHA: one camera is a plain picture, several are a dict of pictures.
         several = len(cameras) > 1

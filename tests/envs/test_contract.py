@@ -11,6 +11,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 from teasim.common.errors import ConfigError
 from teasim.constants import CAMERAS, SUBTASKS
+from teasim.envs.observations import OBS_TYPES
 from teasim.task.scoring import judge
 from tests.envs.fingerprint import fingerprint
 
@@ -21,6 +22,7 @@ VIEWS = {
     "state": {"obs_type": "state"},
     "pixels": {"obs_type": "pixels", **ONE_CAMERA},
     "pixels_agent_pos": {"obs_type": "pixels_agent_pos", **ONE_CAMERA},
+    "pixels_state": {"obs_type": "pixels_state", **ONE_CAMERA},
 }
 SEVERAL = {"obs_type": "pixels_agent_pos", "width": 64, "height": 64}
 INFO = {
@@ -60,6 +62,7 @@ def test_observation_keys_are_the_conventional_ones(make, name):
     assert set(spaces["state"].spaces) == {"agent_pos", "environment_state"}
     assert set(spaces["pixels"].spaces) == {"pixels"}
     assert set(spaces["pixels_agent_pos"].spaces) == {"agent_pos", "pixels"}
+    assert set(spaces["pixels_state"].spaces) == {"agent_pos", "environment_state", "pixels"}
     assert spaces["pixels"]["pixels"].shape == (64, 64, 3)
     several = make(name, cameras=CAMERAS, **SEVERAL).observation_space
     assert set(several["pixels"].spaces) == set(CAMERAS)
@@ -151,7 +154,10 @@ assert gymnasium.__loader__ is gymnasium.__spec__.loader
 
 
 BAD = {
-    "obs_type": ("smell", "Unknown obs_type 'smell'; choose state, pixels, pixels_agent_pos."),
+    "obs_type": (
+        "smell",
+        f"Unknown obs_type 'smell'; choose {', '.join(OBS_TYPES)}.",
+    ),
     "cameras": (("back",), "Unknown camera 'back'; choose left, cup, front, top."),
     "render_mode": ("ansi", "Unknown render_mode 'ansi'; choose None or rgb_array."),
     "quality": ("great", "Unknown quality 'great'; choose fast, nice."),

@@ -21,7 +21,7 @@ VARIANTS["shaped"] = ("TeaMakingSubtasks", SHAPED)
 BLIND = {"events": ("TeaMakingEvents", {}), "shaped events": ("TeaMakingEvents", SHAPED)}
 """Variants without pictures: they have no other view than `state`, and no `render`."""
 SMALL = {"width": 32, "height": 24, "render_mode": "rgb_array"}
-CAMERAS = {"state": ("cup",), "pixels": ("cup",), "pixels_agent_pos": ("cup", "left")}
+CAMERAS = dict.fromkeys(OBS_TYPES, ("cup",)) | {"pixels_agent_pos": ("cup", "left")}
 
 each_variant = pytest.mark.parametrize("variant", [*VARIANTS, *BLIND])
 each_sight = pytest.mark.parametrize(

@@ -32,7 +32,8 @@ def chain_of(samples, experts=EXPERTS):
         NetworkShape(0, 0, samples.low_dim.shape[1], 0, samples.n_actions), torch.Generator()
     )
     good = np.isin(samples.demos, experts)
-    return make_chain(encoder, samples, np.full(len(samples.labels), 1 / 8), good)
+    count = len(np.unique(samples.demos))
+    return make_chain(encoder, samples, np.full(len(samples.labels), 1 / count), good)
 
 
 def exact(**settings):
@@ -121,6 +122,38 @@ def test_a_free_nu_cancels_the_rewards_where_no_state_recurs():
     np.testing.assert_allclose(learner.decision_weights_, 1.0, atol=0.03)
     right, wrong = mean_weights(learner)
     assert wrong == pytest.approx(right, rel=1e-3)
+
+
+def corrections_of(chain, rewards, gamma):
+    """Estimates of d / d_U with a free nu: for each demonstration (D, 3), and at the end."""
+    config = exact(gamma=gamma)
+    found = np.exp(learn_advantages(chain, rewards, config) / (1 + config.alpha))
+    found /= chain.union.numpy() @ found
+    return found[:-1].reshape(-1, 3), found[-1]
+
+
+def drawn_rewards(chain):
+    return torch.from_numpy(np.random.default_rng(1).normal(0, 1, len(chain.union)))
+
+
+@pytest.mark.parametrize("gamma", [0.5, 0.9])
+def test_on_separate_chains_the_flow_alone_decides_whatever_the_rewards_are(gamma):
+    """d of step t is (1 - gamma) gamma^t, and d_U one visit of four: three steps and the end."""
+    chain = chain_of(corridor(erring(7, of=12), spread=0.3))
+    steps, end = corrections_of(chain, drawn_rewards(chain), gamma)
+    flow = (1 - gamma) * gamma ** np.arange(3)
+    np.testing.assert_allclose(steps, np.tile(4 * flow, (12, 1)), rtol=0.01)
+    assert end == pytest.approx(4 * gamma**3, rel=0.01)
+
+
+def test_where_a_state_recurs_its_choices_differ_by_their_rewards():
+    """Both choices of the second state lead to the third, so nu cannot tell them apart."""
+    chain = chain_of(corridor(erring(7, of=12), spread=0.0))
+    rewards = drawn_rewards(chain)
+    steps, _ = corrections_of(chain, rewards, gamma=0.5)
+    second = rewards[:-1].reshape(-1, 3)[:, 1].numpy()
+    expected = np.exp((second - second[0]) / (1 + exact().alpha))
+    np.testing.assert_allclose(steps[:, 1] / steps[0, 1], expected)
 
 
 def test_a_smooth_nu_separates_them_and_plain_cloning_follows_the_majority():

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("teasim", "filtering", "policies", "scripts")
+PACKAGES = ("teasim", "filtering", "policies", "integrations", "scripts")
 SOURCES = [
     path.relative_to(ROOT).as_posix()
     for package in PACKAGES

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TEXTS = ("README.md", "docs/results.md", "docs/reproduce.md")
+TEXTS = ("README.md", "docs/policies.md", "docs/results.md", "docs/reproduce.md")
 """Texts whose tables are checked."""
 COMMAND = re.compile(
     r"^(?: {4,}|\s*)(?:\.venv/bin/)?(?:teasim [a-z]|python (?:scripts/|-m )|scripts/)", re.MULTILINE
