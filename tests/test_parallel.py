@@ -92,3 +92,16 @@ def test_a_back_end_that_is_not_installed_is_one_sentence(backend, monkeypatch):
         f"The parallel backend '{backend}' is not installed; run 'pip install teasim[{backend}]' "
         "or choose loky."
     )
+
+
+def where(_):
+    """The current folder of a worker."""
+    return os.getcwd()
+
+
+def test_workers_are_where_the_caller_is(tmp_path, monkeypatch):
+    for name in ("one", "two"):
+        folder = tmp_path / name
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        assert set(run(where, range(4), workers=Workers(2))) == {str(folder)}

@@ -5,7 +5,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -26,6 +26,20 @@ WORKER_ENVIRONMENT = {
     "MKL_NUM_THREADS": "1",
     "LP_NUM_THREADS": "0",
 }
+
+
+class _Here(Generic[Item, Result]):
+    """Calls a function in the current folder of the process that made it.
+
+    Processes of loky are reused, and stay in the folder in which they were started.
+    """
+
+    def __init__(self, function: Callable[[Item], Result]) -> None:
+        self._function, self._folder = function, os.getcwd()
+
+    def __call__(self, item: Item) -> Result:
+        os.chdir(self._folder)
+        return self._function(item)
 
 
 def run(
@@ -75,4 +89,6 @@ def _results(
     with CONTEXTS[workers.backend](needed) as options:
         with parallel_config(backend=workers.backend, **options):
             parallel = Parallel(return_as="generator", batch_size=1)
-        yield from parallel(delayed(function)(item) for item in items)
+        # Workers of a cluster may be on another machine, which has no such folder.
+        called = _Here(function) if workers.backend == "loky" else function
+        yield from parallel(delayed(called)(item) for item in items)

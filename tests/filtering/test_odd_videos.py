@@ -8,6 +8,7 @@ import pytest
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
+from filtering.moments.suitable import UnsuitableError
 from filtering.segmentation.config import FitConfig
 from filtering.segmentation.fit import fit_segmenter
 from filtering.segmentation.mstcn.training import MSTCNConfig
@@ -54,7 +55,10 @@ def test_black_videos_fit_a_segmenter_that_sees_nothing(tmp_path, monkeypatch):
     pool = make_toy_pool(tmp_path / "pool", ONE_OF_FIVE, frames_per_subtask=3)
     result = fit_segmenter(pool.root, tmp_path / "s", FitConfig(labelled=3, network=QUICK))
     assert np.isfinite(result.loss)
-    assert flagged(pool, segmenter=str(tmp_path / "s")) == [False] * 5  # all look alike
+    norm = {"segmenter": str(tmp_path / "s"), "score": "norm"}
+    assert flagged(pool, **norm) == [False] * 5  # all look alike
+    with pytest.raises(UnsuitableError, match=r"^Nothing happens in the pictures of left;"):
+        flagged(pool, segmenter=str(tmp_path / "s"))
 
 
 def test_videos_whose_times_contradict_the_log_are_refused(tmp_path):
