@@ -64,6 +64,18 @@ class Browser:
         """
         self.errors.clear()
         self.send("Page.navigate", url=path.resolve().as_uri())
+        self._drawn()
+
+    def reload(self) -> None:
+        """Load the page again in its process, which knows what the page has stored.
+
+        Another process may read the store before the write of the first one has reached it.
+        """
+        self.run("delete document.documentElement.dataset.ready")
+        self.send("Page.reload")
+        self._drawn()
+
+    def _drawn(self) -> None:
         self.wait("document.documentElement?.dataset.ready !== undefined")
         self.run("new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
 

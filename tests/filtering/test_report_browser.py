@@ -52,7 +52,7 @@ def page(tab: Browser, small: Path, tmp_path: Path) -> Browser:
     tab.look(1280, 900)
     tab.open(small)
     tab.run("localStorage.clear()")
-    tab.open(small)
+    tab.reload()
     tab.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
     return tab
 
@@ -133,7 +133,7 @@ def test_one_video_plays_at_a_time_from_the_moment_that_was_clicked(page: Browse
     assert page.errors == []
 
 
-def test_verdicts_become_a_weight_table(page: Browser, small: Path, tmp_path: Path) -> None:
+def test_verdicts_become_a_weight_table(page: Browser, tmp_path: Path) -> None:
     click(page, "#save-weights")
     path = downloaded(page, tmp_path, "weights.csv")
     told = [view(index) for index in range(15)]
@@ -145,7 +145,7 @@ def test_verdicts_become_a_weight_table(page: Browser, small: Path, tmp_path: Pa
     click(page, "#demo-1 [data-says=correct]")
     click(page, "#demo-1 [data-says=correct]")  # taken back
     assert page.run("document.getElementById('judged').textContent") == "1 confirmed, 2 overruled."
-    page.open(small)  # they survive a reload
+    page.reload()  # they survive it
     assert page.run("document.getElementById('judged').textContent") == "1 confirmed, 2 overruled."
     click(page, "#save-weights")
     rows = read_weight_table(downloaded(page, tmp_path, "weights.csv"))
