@@ -248,9 +248,8 @@ class RecurrentNetwork(nn.Module):
         features = self.encoder(maps, low_dim)[:, None]
         taken = features.new_zeros(len(features), 1)
         if hidden is not None and self.memory.horizon:
-            goes_on = hidden[-1] < self.memory.horizon
-            taken = hidden[-1] * goes_on
-            hidden = tuple(part * goes_on for part in hidden)
+            hidden = cleared(hidden, self.memory.horizon)
+            taken = hidden[-1]
         remembered, after = self.lstm(features, None if hidden is None else self._layers(hidden))
         output, cell = (part.transpose(0, 1).flatten(1) for part in after)
         counted = (taken + 1,) if self.memory.horizon else ()
@@ -263,6 +262,12 @@ class RecurrentNetwork(nn.Module):
             for part in hidden[:2]
         )
         return output, cell
+
+
+def cleared(hidden: HiddenState, horizon: int) -> HiddenState:
+    """Return a hidden state, 0 where its last part (n, 1), the steps, has come to `horizon`."""
+    goes_on = hidden[-1] < horizon
+    return tuple(part * goes_on for part in hidden)
 
 
 def undecided_head(features: int, actions: int) -> nn.Linear:

@@ -5,7 +5,7 @@ BC-RNN of Mandlekar et al., "What Matters in Learning from Offline Human Demonst
 training and in use: carried through a whole episode, it holds states that no demonstration showed.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -16,9 +16,9 @@ from torch.nn.functional import cross_entropy
 
 from policies.data.motions import MotionSamples
 from policies.learners.joints.chunk_policy import ChunkPolicy
-from policies.learners.joints.cloning import Draws, set_scales, shape_for
+from policies.learners.joints.cloning import Draws, prepare_network, shape_for
 from policies.learners.joints.descent import PlanConfig, descend
-from policies.learners.joints.recurrent import Memory, RecurrentPlanNetwork
+from policies.learners.joints.recurrent import RecurrentPlanNetwork
 from policies.learners.joints.steps.rows import Rows, prepare
 from teasim.common.errors import ConfigError
 
@@ -35,11 +35,6 @@ class JointBCRNNConfig(PlanConfig):
     """Control steps after which the memory is cleared; Mandlekar et al. take 10."""
     hidden: int = 64
     """H, size of the LSTM; Mandlekar et al. take two layers of 400."""
-
-    @property
-    def memory(self) -> Memory:
-        """What the network remembers."""
-        return Memory(self.hidden, self.horizon)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a value that cannot train."""
@@ -67,27 +62,20 @@ class JointBCRNN:
         config, rows = self.config, prepare(samples, weights, timed=True)
         subtasks = int(rows.subtasks.max()) + 1
         shape, draws = shape_for(rows, subtasks, config), Draws(rows, subtasks, config)
-        memory = asdict(config.memory)
-        network = RecurrentPlanNetwork(shape, config.seed, config.ensemble, **memory)
-        set_scales(network, rows, draws)
-        if subtasks > 1:
-            network.relevant.copy_(torch.from_numpy(rows.relevant))
+        network = RecurrentPlanNetwork(
+            shape, config.seed, config.ensemble, config.hidden, config.horizon
+        )
+        prepare_network(network, rows, draws)
 
         def loss(_: int) -> Tensor:
-            first = draws.batch()
-            chosen, counts = windows(rows, first.ravel(), config.horizon)
+            chosen, counts = windows(rows, draws.batch().ravel(), config.horizon)
             given = network.normaliser.inputs(torch.from_numpy(rows.given[chosen]))
-            read = network.read(given, None)[0]
-            parts = (
-                given.view(subtasks, -1, shape.inputs),
-                read.reshape(subtasks, -1, config.hidden),
-            )
-            planned = network(*parts).flatten(0, 1)
+            seen = network.read(given, None)[0].flatten(0, 1)
+            planned = network(seen.view(subtasks, -1, seen.shape[1])).flatten(0, 1)
             wanted = torch.from_numpy(rows.planned(chosen.ravel(), config.chunk))
             missed = (planned - network.normaliser.targets(wanted)).abs().mean(dim=(1, 2))
-            logits = network.tell(given.flatten(0, 1), read.flatten(0, 1))
             labels = torch.from_numpy(rows.subtasks[chosen.ravel()])
-            told = cross_entropy(logits, labels, reduction="none")
+            told = cross_entropy(network.tell(seen), labels, reduction="none")
             return ((missed + told) * counts.ravel()).sum() / counts.sum()
 
         self.history_ = descend(network, loss, config)
@@ -100,7 +88,6 @@ def windows(rows: Rows, first: NDArray[np.int64], horizon: int) -> tuple[NDArray
 
     Where a demonstration ends, the rest of its window does not count.
     """
-    ahead = first[:, None] + np.arange(horizon)
-    stops = rows.stops[np.searchsorted(rows.stops, first, side="right")][:, None]
-    counts = torch.from_numpy((ahead < stops).astype(np.float32))
-    return np.minimum(ahead, stops - 1), counts
+    ahead, last = first[:, None] + np.arange(horizon), rows.last(first)[:, None]
+    counts = torch.from_numpy((ahead <= last).astype(np.float32))
+    return np.minimum(ahead, last), counts

@@ -7,7 +7,7 @@ from torch import Tensor
 from torch.nn.functional import cross_entropy
 
 from policies.learners.joints.descent import PlanConfig, descend
-from policies.learners.joints.networks import ChunkNetwork, PlanNetwork, PlanShape
+from policies.learners.joints.networks import ChunkNetwork, PlanShape
 from policies.learners.joints.steps.rows import Rows
 
 EARLY_OR_LATE = 8
@@ -31,9 +31,7 @@ def clone_chunks(
     """
     draws = Draws(rows, subtasks, config)
     network = ChunkNetwork(shape_for(rows, subtasks, config), config.seed, config.ensemble)
-    set_scales(network, rows, draws)
-    if subtasks > 1:
-        network.relevant.copy_(torch.from_numpy(rows.relevant))
+    prepare_network(network, rows, draws)
 
     def loss(_: int) -> Tensor:
         chosen = draws.batch()
@@ -88,14 +86,16 @@ def shape_for(rows: Rows, subtasks: int, config: PlanConfig) -> PlanShape:
     )
 
 
-def set_scales(network: PlanNetwork, rows: Rows, draws: Draws) -> None:
-    """Set the normaliser and the values of the switches of `network` for `rows`."""
+def prepare_network(network: ChunkNetwork, rows: Rows, draws: Draws) -> None:
+    """Set what `network` does not learn: scales, values of the switches, and what is relevant."""
     size = draws.batch().size
     some = np.concatenate([draws.batch().ravel() for _ in range(1 + SCALED_ON // size)])
     given, wanted = rows.given[some], rows.planned(some, network.shape.chunk)
     network.normaliser.fit(given, wanted, rows.switches)
     for place, values in rows.values.items():
         network.values[place, : len(values)] = torch.from_numpy(values)
+    if network.shape.subtasks > 1:
+        network.relevant.copy_(torch.from_numpy(rows.relevant))
 
 
 def _before_a_switch(rows: Rows) -> NDArray[np.bool_]:

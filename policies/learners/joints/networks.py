@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torch.nn.functional import gelu, layer_norm
+from torch.nn.functional import gelu, layer_norm, pad
 
 from policies.learners.joints.steps.switches import MOST_VALUES
 
@@ -166,10 +166,15 @@ class ChunkNetwork(nn.Module):
         random = torch.Generator().manual_seed(seed)
         self.normaliser = Normaliser(shape)
         self.register_buffer("values", torch.full((shape.actions, MOST_VALUES), torch.nan))
-        sizes = shape.inputs, shape.width, shape.blocks, shape.chunk * shape.actions
         self.register_buffer("relevant", torch.ones(shape.subtasks, shape.inputs))
-        self.experts = Residual(shape.subtasks, sizes, random)
-        self.teller = Residual(1, (shape.inputs, shape.width, 1, shape.subtasks), random)
+        self.remembered = self._make_memory(random)
+        seen, planned = shape.inputs + self.remembered, shape.chunk * shape.actions
+        self.experts = Residual(shape.subtasks, (seen, shape.width, shape.blocks, planned), random)
+        self.teller = Residual(1, (seen, shape.width, 1, shape.subtasks), random)
+
+    def _make_memory(self, random: torch.Generator) -> int:  # noqa: ARG002  (for subclasses)
+        """Return H, how many remembered numbers the networks are given after the inputs."""
+        return 0
 
     @property
     def settings(self) -> Mapping[str, float]:
@@ -181,18 +186,19 @@ class ChunkNetwork(nn.Module):
         """It has no hidden state."""
         return ()
 
-    def tell(self, inputs: Tensor) -> Tensor:
-        """Return logits of the sub-tasks (n, E) for normalised inputs (n, I)."""
-        logits: Tensor = self.teller(inputs[None])[0]
+    def tell(self, seen: Tensor) -> Tensor:
+        """Return logits of the sub-tasks (n, E) for normalised inputs and memory (n, I + H)."""
+        logits: Tensor = self.teller(seen[None])[0]
         return logits
 
-    def forward(self, inputs: Tensor, members: Tensor | None = None) -> Tensor:
-        """Return normalised targets (E, n, K, J) for normalised inputs (E, n, I).
+    def forward(self, seen: Tensor, members: Tensor | None = None) -> Tensor:
+        """Return normalised targets (E, n, K, J) for normalised inputs and memory (E, n, I + H).
 
         With `members` (m,) only these sub-tasks are planned for, and E is m.
         """
         relevant = self.relevant if members is None else self.relevant[members]
-        planned: Tensor = self.experts(inputs * relevant[:, None], members)
+        relevant = pad(relevant, (0, self.remembered), value=1.0)
+        planned: Tensor = self.experts(seen * relevant[:, None], members)
         return planned.view(*planned.shape[:2], self.shape.chunk, self.shape.actions)
 
     def plan(
@@ -202,8 +208,10 @@ class ChunkNetwork(nn.Module):
         hidden: HiddenState | None,  # noqa: ARG002  (the protocol's)
     ) -> tuple[Tensor, Tensor, HiddenState]:
         """Return logits of the sub-tasks (n, E), targets (n, K, J), and an empty hidden state."""
-        given = self.normaliser.inputs(inputs)
-        logits = self.tell(given)
+        return *self._chosen(self.normaliser.inputs(inputs), subtasks), ()
+
+    def _chosen(self, seen: Tensor, subtasks: Tensor | None) -> tuple[Tensor, Tensor]:
+        """Return logits (n, E) and the targets (n, K, J) of the sub-tasks that are planned for."""
+        logits = self.tell(seen)
         chosen = logits.argmax(dim=1) if subtasks is None else subtasks
-        planned = self(given[:, None], chosen)[:, 0]
-        return logits, self.normaliser.restored(planned), ()
+        return logits, self.normaliser.restored(self(seen[:, None], chosen)[:, 0])

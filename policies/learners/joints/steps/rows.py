@@ -48,13 +48,16 @@ class Rows:
         """First row of each demonstration, (D,)."""
         return np.append(0, self.stops[:-1])
 
+    def last(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the last row of the demonstration of each of `rows` (n,), (n,)."""
+        return np.asarray(self.stops[np.searchsorted(self.stops, rows, side="right")] - 1)
+
     def planned(self, rows: NDArray[np.int64], chunk: int) -> NDArray[np.float32]:
         """Return the next `chunk` targets (n, K, J) from `rows`, relative to measured positions.
 
         After the last step of a demonstration its target is held. Switches are not relative.
         """
-        last = self.stops[np.searchsorted(self.stops, rows, side="right")] - 1
-        ahead = np.minimum(rows[:, None] + np.arange(chunk), last[:, None])
+        ahead = np.minimum(rows[:, None] + np.arange(chunk), self.last(rows)[:, None])
         return np.asarray(self.targets[ahead] - self.measured[rows, None])
 
 
