@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import Counterparts, Match
+from filtering.moments.counterparts import Counterparts, Match, how_far
 from filtering.moments.replaced import FOUND
 
 Array = NDArray[np.float64]
@@ -61,8 +61,8 @@ def agree(found: Counterparts) -> Agreement:
     row = _most_central(found)
     reference = found.references[row]
     matches = [match for match in found.there[row] if match is not None]
-    near = np.stack([match.contested for match in matches])
-    shown = near - np.median(near, axis=0) < FOUND
+    far = np.stack([match.contested for match in matches])
+    shown = far - np.median(far, axis=0) < FOUND
     jumps = np.stack([jumps_of(match) for match in matches]).mean(axis=0)
     borders = _borders(jumps)
     edges = [0, *borders, found.lengths[reference]]
@@ -109,8 +109,4 @@ def _span(match: Match, start: int, stop: int) -> tuple[int, int]:
 
 
 def _most_central(found: Counterparts) -> int:
-    far = [
-        float(np.median([np.median(match.near) for match in row if match is not None]))
-        for row in found.there
-    ]
-    return int(np.argmin(far))
+    return int(np.argmin([how_far(row) for row in found.there]))

@@ -12,7 +12,7 @@ least
     contested(t, u) = log D(t, u) + max(0, log D(t, u) - min over t' of log D(t', u)).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -111,12 +111,14 @@ def choose_references(vectors: Sequence[Vectors]) -> tuple[int, ...]:
         return tuple(range(count))
     order = sorted(range(count), key=lambda d: (len(vectors[d]), float(np.abs(vectors[d]).sum())))
     found = compare(vectors, _spread(order, SCOUTS))
-    far = [
-        float(np.median([np.median(m.near) for row in found.back if (m := row[d]) is not None]))
-        for d in range(count)
-    ]
+    far = [how_far(row[d] for row in found.back) for d in range(count)]
     limit = float(np.quantile(far, TRUSTED))
     return tuple(sorted(_spread([d for d in order if far[d] <= limit], MOST_REFERENCES)))
+
+
+def how_far(matches: Iterable[Match | None]) -> float:
+    """Return how far a video is from others: the median of the median log distances."""
+    return float(np.median([np.median(match.near) for match in matches if match is not None]))
 
 
 def _spread(numbers: Sequence[int], count: int) -> list[int]:

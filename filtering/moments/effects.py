@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import Counterparts
+from filtering.moments.counterparts import Counterparts, how_far
 from filtering.moments.evidence import VARIETY, Evidence, Stretch, Trusted
 from filtering.moments.vectors import Video
 
@@ -245,10 +245,7 @@ def _share_lacking(amounts: Amounts, trusted: Trusted) -> Array:
 
 def _central(found: Counterparts) -> list[int]:
     """Return the rows of the most central references."""
-    far = [
-        float(np.median([np.median(match.near) for match in row if match is not None]))
-        for row in found.there
-    ]
+    far = [how_far(row) for row in found.there]
     return np.argsort(far, kind="stable")[:OBSERVERS].tolist()
 
 

@@ -12,7 +12,8 @@ Order counts only where the counterpart of the counterpart is the moment itself:
 alike. What a share VARIETY of the videos does, an optional step left out or another legal order, is
 thus never evidence. Each curve is summed up by the mean of its largest twelfth over t, because a
 step is a part of a video; missing and order by the median over the trusted references, because a
-reference may be incorrect too; extra by the quantile SHARED over all of them. Extra is also found
+reference may be incorrect too; extra by the quantile SHARED over all of them, so that trust does
+not change it. Extra is also found
 from plain nearest moments in place of counterparts, and the larger value counts: a step done twice
 is seen in contested places alone, and one that nobody else does better in plain ones. Missing and
 extra count less the more of the stretch is replaced, see `replaced`.
@@ -20,6 +21,7 @@ extra count less the more of the stretch is replaced, see `replaced`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,15 +90,15 @@ def references_of(found: Counterparts, trusted: Trusted) -> "list[Reference]":
 
 
 def missing_order_extra(
-    references: "Sequence[Reference]", count: int
+    references: "Sequence[Reference]", strange: "Sequence[Strange]"
 ) -> tuple[Evidence, Evidence, Evidence]:
     """Return the evidence of the three kinds, in the order of the name.
 
     Args:
         references: what is usual.
-        count: D, the number of demonstrations.
+        strange: per demonstration how strange its moments are, see `strange_in`.
     """
-    results = [_Comparison([r for r in references if r.number != d], d) for d in range(count)]
+    results = [_Comparison(references, one, d) for d, one in enumerate(strange)]
     return (
         _evidence([one.missing() for one in results]),
         _evidence([one.order() for one in results]),
@@ -126,7 +128,7 @@ def variety_of(moves: Array) -> float:
     Args:
         moves: (R, R) see `moves_between`.
     """
-    kept = np.sort(np.nanmean(np.where(np.isnan(moves), np.nan, moves < SMALL_MOVE), axis=1))
+    kept = np.sort(np.nanmean(_in_one_order(moves), axis=1))
     low, high = AGREED
     free = np.clip((high - kept[len(kept) // 2]) / (high - low), 0.0, 1.0)
     return float(free * np.nanquantile(moves, FREEST))
@@ -134,7 +136,12 @@ def variety_of(moves: Array) -> float:
 
 def share_of_one_order(moves: Array) -> float:
     """Return the share of the pairs of demonstrations that keep one order; see `moves_between`."""
-    return float((moves[~np.isnan(moves)] < SMALL_MOVE).mean())
+    return float(np.nanmean(_in_one_order(moves)))
+
+
+def _in_one_order(moves: Array) -> Array:
+    """Return (R, R): 1 for pairs that keep one order, 0 for others, NaN where nothing is known."""
+    return np.where(np.isnan(moves), np.nan, moves < SMALL_MOVE)
 
 
 def rows_of(found: Counterparts, trusted: Trusted) -> list[int]:
@@ -203,23 +210,39 @@ class Reference:
         self.trusted = row in rows
         """Whether the reference says itself what is usual."""
         self._there, self._back = found.there[row], found.back[row]
-        everybody = [one for one in self._there if one is not None]
-        self._well = tuple(
-            np.quantile(curves, WELL, axis=0)
-            for curves in ([m.near for m in everybody], [m.contested for m in everybody])
-        )
         others = [k for other in rows if (k := found.references[other]) != self.number]
         self._rows = {k: place for place, k in enumerate(others)}
         self._lacks = np.stack([self._match(k).contested for k in others])
-        self._median = np.median(self._lacks, axis=0)
-        self._moved = np.stack([self._moved_in(k) for k in others])
 
-    def departures(self, d: int) -> tuple[Array, Array]:
-        """Return (n,), (n,): how much farther than usual, and how much displaced, d shows it."""
-        kept = [place for k, place in self._rows.items() if k != d] or [0]
-        lack = self._match(d).contested - usual_of(self._lacks[kept])
+    def lack(self, d: int) -> Array:
+        """Return (n,): how much farther than usual the counterparts in d are."""
+        return self._match(d).contested - usual_of(self._lacks[self._besides(d)])
+
+    def shift(self, d: int) -> Array:
+        """Return (n,): how much farther than usual the moments are moved in d."""
         own = self._moved[self._rows[d]] if d in self._rows else self._moved_in(d)
-        return lack, np.maximum(own - usual_of(self._moved[kept]), 0.0)
+        return np.maximum(own - usual_of(self._moved[self._besides(d)]), 0.0)
+
+    def moves(self) -> dict[int, float]:
+        """Return how far steps move in each other trusted demonstration, by its number."""
+        return {k: worst(self._moved[place]) for k, place in self._rows.items()}
+
+    def at(self, d: int) -> NDArray[np.int64]:
+        """Return (n,): the counterparts in d."""
+        return self._match(d).at
+
+    def _besides(self, d: int) -> list[int]:
+        """Return the rows of the trusted demonstrations that d is compared with."""
+        return [place for k, place in self._rows.items() if k != d] or [0]
+
+    @cached_property
+    def _moved(self) -> Array:
+        """(K, n) how far the moments are moved in each other trusted demonstration."""
+        return np.stack([self._moved_in(k) for k in self._rows])
+
+    @cached_property
+    def _median(self) -> NDArray[np.floating]:
+        return np.asarray(np.median(self._lacks, axis=0))
 
     def _moved_in(self, d: int) -> Array:
         match, back = self._match(d), self._back[d]
@@ -232,26 +255,43 @@ class Reference:
         assert match is not None
         return match
 
-    def moves(self) -> dict[int, float]:
-        """Return how far steps move in each other trusted demonstration, by its number."""
-        return {k: worst(self._moved[place]) for k, place in self._rows.items()}
 
-    def at(self, d: int) -> NDArray[np.int64]:
-        """Return (n,): the counterparts in d."""
-        return self._match(d).at
+@dataclass(frozen=True)
+class Strange:
+    """How much worse than others the moments of one demonstration are found in the references."""
 
-    def strange(self, d: int) -> tuple[Side, Side]:
-        """Return how much worse than others the moments of d are found here.
+    sides: tuple[tuple[Side, ...], ...]
+    """Once by nearest moments and once by counterparts, per reference but itself."""
+    curves: tuple[Array, ...]
+    """(n,) of each way: what a share SHARED of the references says."""
 
-        First by nearest moments, then by counterparts.
-        """
-        match = self._back[d]
-        assert match is not None
-        near, contested = self._well
-        return (
-            Side(np.asarray(match.near - near[match.nearest], np.float64), match.nearest),
-            Side(np.asarray(match.contested - contested[match.at], np.float64), match.at),
-        )
+
+def strange_in(found: Counterparts) -> list[Strange]:
+    """Return per demonstration how strange its moments are, whoever is trusted."""
+    well = [_found_well(row) for row in found.there]
+    results = []
+    for d in range(len(found.lengths)):
+        matches = [(row[d], best) for row, best in zip(found.back, well, strict=True)]
+        both = [_strange(match, best) for match, best in matches if match is not None]
+        sides = tuple(zip(*both, strict=True))
+        curves = (np.quantile([side.curve for side in way], SHARED, axis=0) for way in sides)
+        results.append(Strange(sides, tuple(curves)))
+    return results
+
+
+def _found_well(row: Sequence[Match | None]) -> tuple[Array, Array]:
+    """Return how far the moments of a reference are where they are found best, in both ways."""
+    matches = [match for match in row if match is not None]
+    near, contested = [m.near for m in matches], [m.contested for m in matches]
+    return np.quantile(near, WELL, axis=0), np.quantile(contested, WELL, axis=0)
+
+
+def _strange(match: Match, well: tuple[Array, Array]) -> tuple[Side, Side]:
+    near, contested = well
+    return (
+        Side(np.asarray(match.near - near[match.nearest], np.float64), match.nearest),
+        Side(np.asarray(match.contested - contested[match.at], np.float64), match.at),
+    )
 
 
 _Result = tuple[float, Stretch, Stretch]
@@ -260,38 +300,34 @@ _Result = tuple[float, Stretch, Stretch]
 class _Comparison:
     """A demonstration compared with all references."""
 
-    def __init__(self, references: Sequence[Reference], d: int) -> None:
-        self._references, self._d = references, d
-        pairs = [reference.departures(d) for reference in references]
-        self._lacks, self._shifts = [lack for lack, _ in pairs], [shift for _, shift in pairs]
-        self._sides = list(zip(*(reference.strange(d) for reference in references), strict=True))
-        self._curves: list[Array] = [
-            np.quantile([side.curve for side in sides], SHARED, axis=0) for sides in self._sides
-        ]
+    def __init__(self, references: Sequence[Reference], strange: Strange, d: int) -> None:
+        self._strange, self._d = strange, d
+        self._references = [reference for reference in references if reference.number != d]
+        self._trusted = [reference for reference in self._references if reference.trusted]
+        self._lacks = {reference.number: reference.lack(d) for reference in self._references}
 
     def missing(self) -> _Result:
-        filled = self._curves[0]
+        filled = self._strange.curves[0]
+        lacks = [self._lacks[reference.number] for reference in self._trusted]
         values = [
             less(worst(lack), replaced(Side(lack, r.at(self._d)), filled, *peak(lack)))
-            for r, lack in zip(self._references, self._lacks, strict=True)
+            for r, lack in zip(self._trusted, lacks, strict=True)
         ]
-        return self._middle(values, self._lacks)
+        return self._middle(values, lacks)
 
     def order(self) -> _Result:
-        return self._middle([worst(shift) for shift in self._shifts], self._shifts)
+        shifts = [reference.shift(self._d) for reference in self._trusted]
+        return self._middle([worst(shift) for shift in shifts], shifts)
 
     def extra(self) -> _Result:
-        results = [
-            self._strange(curve, sides)
-            for curve, sides in zip(self._curves, self._sides, strict=True)
-        ]
-        return max(results, key=lambda result: result[0])
+        ways = zip(self._strange.curves, self._strange.sides, strict=True)
+        return max((self._extra(*way) for way in ways), key=lambda result: result[0])
 
-    def _strange(self, curve: Array, sides: Sequence[Side]) -> _Result:
+    def _extra(self, curve: Array, sides: Sequence[Side]) -> _Result:
         start, stop = peak(curve)
         shares = [
             replaced(Side(curve, side.at), lack, start, stop)
-            for side, lack in zip(sides, self._lacks, strict=True)
+            for side, lack in zip(sides, self._lacks.values(), strict=True)
         ]
         value = less(worst(curve), float(np.median(shares)))
         nearest = int(np.argmin([side.curve[start:stop].mean() for side in sides]))
@@ -301,15 +337,13 @@ class _Comparison:
 
     def _middle(self, values: Sequence[float], curves: Sequence[Array]) -> _Result:
         """Sum up the values of the trusted references; the places are those of the median one."""
-        trusted = [n for n, reference in enumerate(self._references) if reference.trusted]
-        ordered = sorted(trusted or range(len(values)), key=lambda number: values[number])
-        chosen = ordered[len(ordered) // 2]
+        chosen = int(np.argsort(values, kind="stable")[len(values) // 2])
+        reference = self._trusted[chosen]
         start, stop = peak(curves[chosen])
-        places = np.sort(self._references[chosen].at(self._d)[start:stop])
+        places = np.sort(reference.at(self._d)[start:stop])
         low, high = np.quantile(places, (0.25, 0.75)).astype(int)
         own = Stretch(self._d, int(low), int(high) + 1)
-        middle = float(np.median([values[number] for number in ordered]))
-        return middle, own, Stretch(self._references[chosen].number, start, stop)
+        return float(np.median(values)), own, Stretch(reference.number, start, stop)
 
 
 def less(value: float, share: float) -> float:

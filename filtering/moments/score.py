@@ -23,12 +23,14 @@ from filtering.moments.effects import View, ineffective, observe
 from filtering.moments.evidence import (
     Evidence,
     Reference,
+    Strange,
     Stretch,
     Trusted,
     missing_order_extra,
     moves_between,
     references_of,
     share_of_one_order,
+    strange_in,
     variety_of,
 )
 from filtering.moments.suitable import Comparable, check_videos, comparable
@@ -149,12 +151,13 @@ def score_comparable(seen: Comparable) -> MomentScore:
 def gather(
     found: Counterparts,
     references: Sequence[Reference],
+    strange: Sequence[Strange],
     views: Sequence[View],
     trusted: Trusted,
 ) -> dict[str, Evidence]:
     """Return the evidence of every kind that one camera gives, measured by the trusted."""
     kinds = (
-        *missing_order_extra(references, len(found.lengths)),
+        *missing_order_extra(references, strange),
         ineffective(found, views, trusted),
     )
     return dict(zip(KINDS, kinds, strict=True))
@@ -167,6 +170,7 @@ def _judged(
 ) -> MomentScore:
     """Put cameras and kinds together."""
     cameras = list(found)
+    strange = {camera: strange_in(one) for camera, one in found.items()}
     evidence: dict[str, dict[str, Evidence]] = {}
     one_order: dict[str, float] = {}  # known since the first round, which trusts everybody
 
@@ -174,7 +178,9 @@ def _judged(
         moves = {}
         for camera in cameras:
             references = references_of(found[camera], trusted)
-            evidence[camera] = gather(found[camera], references, views[camera], trusted)
+            evidence[camera] = gather(
+                found[camera], references, strange[camera], views[camera], trusted
+            )
             moves[camera] = moves_between(references)
         if trusted.all():
             one_order.update({c: share_of_one_order(far) for c, far in moves.items()})
