@@ -6,9 +6,6 @@
 It carries out the sub-tasks in a fixed order and looks at nothing.
 """
 
-import numpy as np
-
-from policies.data.samples import ObservationSpec
 from teasim.constants import SUBTASKS
 
 RECIPE = (
@@ -21,17 +18,11 @@ RECIPE = (
 class Recipe:
     """Chooses the sub-tasks of the recipe one after the other."""
 
-    spec = ObservationSpec(cameras=(), height=0, width=0)
-    """What it sees: nothing."""
-    action_names = SUBTASKS
-    """What it chooses from."""
-
     def predict(self, observation, state=None, episode_start=None, deterministic=False):
         """Return the next sub-task, and how many have been chosen."""
         del observation, episode_start, deterministic
-        taken = 0 if state is None else int(state[0][0])
-        action = SUBTASKS.index(RECIPE[min(taken, len(RECIPE) - 1)])
-        return np.array(action), (np.array([taken + 1]),)
+        taken = 0 if state is None else state
+        return SUBTASKS.index(RECIPE[taken % len(RECIPE)]), taken + 1
 
 
 if __name__ == "__main__":

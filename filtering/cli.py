@@ -170,6 +170,11 @@ def basis(fitted: "DemoFilter") -> str:
     if chosen.score == "moments":
         return f"Judged by moments of the videos alone (camera {cameras})."
     if chosen.score == "combined":
+        if chosen.segmenter != "clustering":
+            return (
+                f"Judged by moments of the videos (camera {cameras}), and by sub-tasks that the "
+                f"segmenter '{chosen.segmenter}' found in them."
+            )
         return f"Judged by moments and found sub-tasks of the videos alone (camera {cameras})."
     if chosen.segmenter == "logged":
         return "Judged by the logged sub-tasks."

@@ -34,32 +34,36 @@ def is_named(run: Path) -> bool:
     return NAME.fullmatch(str(run)) is not None and not run.exists()
 
 
-class ForeignPolicy:
-    """A policy over sub-tasks that somebody else wrote; in another process it is made anew."""
+class Named:
+    """An object by its name; in another process it is made anew."""
 
-    draws = True
-
-    def __init__(
-        self, name: str, folder: str, spec: ObservationSpec, action_names: tuple[str, ...]
-    ) -> None:
+    def __init__(self, name: str, folder: str) -> None:
         """Find the object `name`, importable from `folder` too, and call it if it is a class.
 
         Raises:
             ConfigError: there is no such object, or it has no method `predict`.
         """
-        self._name, self._folder = name, folder
-        self._held = find_object(name, folder)
-        self.draws = bool(getattr(self._held, "draws", True))
+        self.name, self.folder = name, folder
+        self.held = find_object(name, folder)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.name, self.folder)
+
+
+class ForeignPolicy:
+    """A policy over sub-tasks that somebody else wrote."""
+
+    def __init__(self, named: Named, spec: ObservationSpec, action_names: tuple[str, ...]) -> None:
+        """Make a policy of an object; what it sees and chooses from is that of an environment."""
+        self._named = named
+        self.draws = bool(getattr(named.held, "draws", True))
         self.spec = spec
         self.action_names = action_names
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self._name, self._folder, self.spec, self.action_names)
-
     def set_random_seed(self, seed: int) -> None:
         """Restart the random numbers, if the policy can."""
-        if hasattr(self._held, "set_random_seed"):
-            self._held.set_random_seed(seed)
+        if hasattr(self._named.held, "set_random_seed"):
+            self._named.held.set_random_seed(seed)
 
     def predict(
         self,
@@ -73,10 +77,10 @@ class ForeignPolicy:
         Raises:
             ConfigError: the answer is not an action and a state, or there is no such action.
         """
-        answer = self._held.predict(observation, state, episode_start, deterministic)
+        answer = self._named.held.predict(observation, state, episode_start, deterministic)
         if not isinstance(answer, tuple) or len(answer) != 2:
             raise ConfigError(
-                f"predict of '{self._name}' returned {answer!r}; return (action, state)."
+                f"predict of '{self._named.name}' returned {answer!r}; return (action, state)."
             )
         return self._checked(np.asarray(answer[0])), answer[1]
 
@@ -84,8 +88,8 @@ class ForeignPolicy:
         """Return `action` as one number that is a sub-task's."""
         if action.size != 1 or action.item() not in range(len(self.action_names)):
             raise ConfigError(
-                f"predict of '{self._name}' chose {action.tolist()}; choose a number from 0 to "
-                f"{len(self.action_names) - 1}."
+                f"predict of '{self._named.name}' chose {action.tolist()}; choose a number "
+                f"from 0 to {len(self.action_names) - 1}."
             )
         return action.reshape(()).astype(np.int64)
 
@@ -97,7 +101,7 @@ class ForeignJointPolicy(ForeignPolicy, JointPolicy):
         """Return `action` as one target [rad; m for grippers] per joint and gripper."""
         if action.size != len(self.action_names):
             raise ConfigError(
-                f"predict of '{self._name}' returned {action.size} targets; return "
+                f"predict of '{self._named.name}' returned {action.size} targets; return "
                 f"{len(self.action_names)}."
             )
         return action.reshape(-1).astype(np.float32)
@@ -109,9 +113,8 @@ def adopt(name: str, environment: EnvironmentConfig) -> ForeignPolicy:
     Raises:
         ConfigError: there is no such object, it is no policy, or the environment cannot be made.
     """
-    folder = os.getcwd()
-    held = find_object(name, folder)
-    level = getattr(held, "level", LEVELS[0])
+    named = Named(name, os.getcwd())
+    level = getattr(named.held, "level", LEVELS[0])
     if level not in LEVELS:
         raise ConfigError(f"Unknown level '{level}' of '{name}'; choose {', '.join(LEVELS)}.")
     env = make_environment(environment.at_level(level), NOTHING_SEEN)
@@ -120,10 +123,10 @@ def adopt(name: str, environment: EnvironmentConfig) -> ForeignPolicy:
         joints = _numbered("joint", np.size(observation.get("agent_pos", ())))
         station = _numbered("state", np.size(observation.get("environment_state", ())))
         controlled = _numbered("target", int(np.prod(env.action_space.shape or ())))
-    spec = getattr(held, "spec", None) or ObservationSpec((), 0, 0, joints, station)
+    spec = getattr(named.held, "spec", None) or ObservationSpec((), 0, 0, joints, station)
     if level == "joint":
-        return ForeignJointPolicy(name, folder, spec, controlled)
-    return ForeignPolicy(name, folder, spec, tuple(info["subtasks"]))
+        return ForeignJointPolicy(named, spec, controlled)
+    return ForeignPolicy(named, spec, tuple(info["subtasks"]))
 
 
 def find_object(name: str, folder: str) -> Any:

@@ -93,21 +93,14 @@ def main() -> int:
         pool = make_bank(
             arguments.folder / name, SCENES[name], seed=0, workers=Workers(arguments.jobs)
         )
-        optional = SCENES[name].optional
-        judge(bank_of(name, pool, pool.cameras, optional, arguments), arguments)
+        judge(bank_of(name, pool, pool.cameras, arguments), arguments)
     for root in arguments.tea:
         pool = Pool.open(root)
-        judge(bank_of("tea", pool, arguments.cameras or pool.cameras, (), arguments), arguments)
+        judge(bank_of("tea", pool, arguments.cameras or pool.cameras, arguments), arguments)
     return 0
 
 
-def bank_of(
-    name: str,
-    pool: Pool,
-    cameras: Sequence[str],
-    optional: Sequence[str],
-    arguments: argparse.Namespace,
-) -> Bank:
+def bank_of(name: str, pool: Pool, cameras: Sequence[str], arguments: argparse.Namespace) -> Bank:
     """Take the first videos of each kind of a pool."""
     kinds = np.array([kind_of(episode.record) for episode in pool.episodes])
     chosen = np.sort(
@@ -119,6 +112,7 @@ def bank_of(
         )
     )
     episodes = [pool.episodes[number] for number in chosen]
+    optional = SCENES[name].optional if name in SCENES else ()
     shown = [{span.subtask for span in episode.spans()} for episode in episodes]
     does = np.array([[step in steps for step in optional] for steps in shown], dtype=bool)
     return Bank(name, pool, episodes, tuple(cameras), kinds[chosen], does)

@@ -87,7 +87,9 @@ def test_the_filter_takes_a_segmenter_and_writes_down_how_good_it_was(
 ):
     argv = [str(toy_pool.root), "-o", str(tmp_path / "out"), "--jobs", "1"]
     assert filter_verb([*argv, "--segmenter", str(fitted[0])]) == 0
-    assert "2 of 7 demonstrations are flagged." in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "2 of 7 demonstrations are flagged." in shown
+    assert f"and by sub-tasks that the segmenter '{fitted[0]}' found in them." in shown
     record = json.loads((tmp_path / "out" / "filter.json").read_text())["segmentation"]
     assert record["scores"]["unseen"]["videos"] == 4
     assert record["scores"]["unseen"]["accuracy"] > 90.0

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from policies import foreign
 from policies.cli import evaluate
 from policies.foreign import ForeignJointPolicy, adopt, is_named
 from policies.play.evaluation import evaluate as score
@@ -124,6 +125,14 @@ def test_a_policy_keeps_its_memory_and_draws_from_the_seed_of_the_episode(theirs
     assert scores["deterministic"].policy_accuracy.value == 1
     assert scores["sampled"].policy_accuracy.value < 1
     assert score(policy, config) == scores
+
+
+def test_it_is_made_once_in_a_process(theirs, monkeypatch):
+    found = []
+    find = foreign.find_object
+    monkeypatch.setattr(foreign, "find_object", lambda *name: found.append(name) or find(*name))
+    adopt("their_policies:Counting", FAKE_WORLD)
+    assert len(found) == 1
 
 
 def test_it_is_made_anew_in_other_processes(theirs):
