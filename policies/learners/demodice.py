@@ -60,7 +60,7 @@ class DemoDICEConfig(BCConfig):
     nu_penalty: float = 1e-2
     """Weight of the penalty on the gradient of nu, 0 or more. Kim et al. take 1e-4 for a million
     decisions; 1e-2 was the best of 0, 1e-4, 1e-3, 1e-2, 1e-1, 1 and 10 on one pool of 18
-    demonstrations (docs/results.md)."""
+    demonstrations."""
     mixtures: int = 256
     """Mixtures of either kind that are drawn per gradient step for the penalties."""
     hidden: int = 64

@@ -1,5 +1,7 @@
 """A policy whose every choice is known gets exactly the scores that follow from them."""
 
+from contextlib import closing
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -161,3 +163,11 @@ def test_keys_of_one_kind_are_counted_together_and_a_kind_that_did_not_occur_is_
 def test_a_violation_without_words_is_listed_by_its_key():
     assert kinds_of(Reports(), ("too_fast",), unsafe=True) == {"too fast": True, "unsafe": True}
     assert kinds_of(Reports(violations={"x": "broken cup"}), ()) == {"broken cup": False}
+
+
+@pytest.mark.parametrize("look", ["fixed", "random"])
+def test_a_policy_that_sees_pictures_sees_the_look_that_was_asked_for(look):
+    spec = ObservationSpec(("left",), 32, 32)
+    with closing(make_environment(EnvironmentConfig(look=look), spec)) as env:
+        first, other = (env.reset(seed=seed, options={"randomize": False})[0] for seed in (0, 1))
+    assert np.array_equal(first["pixels"], other["pixels"]) == (look == "fixed")
