@@ -21,7 +21,8 @@ def blocks(page):
     """The commands of the bash blocks of a page, one list per block."""
     text = (ROOT / "docs" / page).read_text()
     found = re.findall(r"```bash\n(.*?)```", text, flags=re.DOTALL)
-    return [[shlex.split(line, comments=True) for line in block.splitlines()] for block in found]
+    lines = [[shlex.split(line, comments=True) for line in block.splitlines()] for block in found]
+    return [[words for words in block if words] for block in lines]
 
 
 def test_the_site_builds_without_a_warning(tmp_path):
