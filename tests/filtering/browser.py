@@ -31,16 +31,29 @@ def find_chromium() -> str | None:
 
 
 class Browser:
-    """One tab of a browser."""
+    """A browser with one tab."""
 
     def __init__(self, process: subprocess.Popen[bytes], read: int, write: int) -> None:
         self._process, self._read, self._write = process, read, write
         self._buffer, self._count = b"", 0
         self._session: str | None = None
+        self._context: str | None = None
         self.errors: list[str] = []
-        target = self.send("Target.createTarget", url="about:blank")["targetId"]
-        attached = self.send("Target.attachToTarget", targetId=target, flatten=True)
-        self._session = attached["sessionId"]
+        self.forget()
+
+    def forget(self) -> None:
+        """Go on in a new tab, which knows nothing that pages of the former one have stored.
+
+        Clearing the store instead may also remove what the next page writes: Chromium tells other
+        processes later that it was cleared.
+        """
+        former, self._session = self._context, None
+        context = self.send("Target.createBrowserContext")["browserContextId"]
+        target = self.send("Target.createTarget", url="about:blank", browserContextId=context)
+        if former:
+            self.send("Target.disposeBrowserContext", browserContextId=former)
+        attached = self.send("Target.attachToTarget", targetId=target["targetId"], flatten=True)
+        self._context, self._session = context, attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.send(f"{domain}.enable")
 

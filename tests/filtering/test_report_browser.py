@@ -49,10 +49,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def page(tab: Browser, small: Path, tmp_path: Path) -> Browser:
     """A page of 15 videos, three of them flagged; downloads are saved in a folder of the test."""
+    tab.forget()
     tab.look(1280, 900)
     tab.open(small)
-    tab.run("localStorage.clear()")
-    tab.reload()
     tab.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
     return tab
 

@@ -281,6 +281,15 @@ def test_a_link_out_of_the_data_set_is_refused(copy: Path, tmp_path: Path) -> No
         Pool.open(copy)
 
 
+def test_a_relative_path_is_that_of_the_folder_one_is_in(
+    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("here", "there"):
+        shutil.copytree(copy, tmp_path / name / "pool")
+        monkeypatch.chdir(tmp_path / name)
+        assert len(Pool.open("pool").episodes) == len(Pool.open(copy).episodes)
+
+
 def test_a_link_to_another_disk_is_followed(copy: Path, tmp_path: Path) -> None:
     shutil.move(copy / "videos", tmp_path / "disk")
     (copy / "videos").symlink_to(tmp_path / "disk")

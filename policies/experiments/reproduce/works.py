@@ -107,7 +107,7 @@ def _reading(
     frames = unit.spec["frames"]
     if "network" in unit.needs:
         network = store.folder_of(unit.needs["network"])
-        return read_bank(Path(pool.root), network, frames), places
+        return read_bank(Path(pool.root).resolve(), network.resolve(), frames), places
     return read(pool.only(places), unit.spec["segmenter"], frames), range(len(places))
 
 

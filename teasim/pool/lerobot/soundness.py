@@ -88,7 +88,7 @@ def _changed_files(meta: Metadata) -> Iterator[tuple[Path, str]]:
         if stale and (parts[0] == "data" or parts[1] not in meta.features):
             continue
         try:
-            path = inside(meta.root, name)
+            path = inside(meta.root, name, meta.homes)
         except PoolError as error:
             yield meta.root / name, str(error)
             continue

@@ -17,7 +17,7 @@ from teasim.pool.lerobot.describing.episode_table import (
     read_parquet_episodes,
 )
 from teasim.pool.lerobot.describing.names import names_by_number
-from teasim.pool.lerobot.describing.places import filled, inside
+from teasim.pool.lerobot.describing.places import filled, homes_of, inside
 
 FASTEST = 1e6
 """No data set has more frames per second."""
@@ -80,6 +80,15 @@ class Metadata:
             if isinstance(line.get("task_index"), int)
         }
 
+    @cached_property
+    def homes(self) -> tuple[Path, ...]:
+        """Folders its files may lie in.
+
+        Raises:
+            PoolError: A link leads to itself.
+        """
+        return homes_of(self.root)
+
     def data_path(self, row: Row) -> Path:
         """Return the data file of the demonstration described by `row`.
 
@@ -104,7 +113,7 @@ class Metadata:
         index = int(row["episode_index"])
         chunk = index // self.info.get("chunks_size", layout.CHUNK_SIZE)
         numbers = {"episode_index": index, "episode_chunk": chunk}
-        return inside(self.root, filled(template, {**numbers, **values}))
+        return inside(self.root, filled(template, {**numbers, **values}), self.homes)
 
 
 _PLACE = ("chunk_index", "file_index")

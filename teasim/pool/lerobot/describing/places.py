@@ -1,7 +1,7 @@
 """Paths that metadata spell out: filled in with numbers, and kept inside the data set."""
 
 import re
-from functools import lru_cache
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from string import Formatter
 
@@ -30,11 +30,10 @@ def filled(template: str, values: dict[str, int | str]) -> str:
         raise PoolError(f"The path '{template}' of info.json is not readable.") from error
 
 
-def inside(root: Path, relative: str) -> Path:
+def inside(root: Path, relative: str, homes: Sequence[Path]) -> Path:
     """Return the path `relative` to `root`, which must not lead out of the data set.
 
-    Links are followed where they stay inside, where the owner made a link of one of `FOLDERS`, and
-    in the cache of the Hugging Face Hub, which keeps the content of files in a folder `blobs`.
+    Links are followed where they lead into one of `homes`, see `homes_of`.
 
     Raises:
         PoolError: The path is absolute, has a part '..', or a link leads elsewhere.
@@ -45,7 +44,7 @@ def inside(root: Path, relative: str) -> Path:
         raise PoolError(f"The path '{relative}' of the metadata leads out of '{root}'.")
     path = root / relative
     try:
-        real, homes = path.resolve(), _homes(root)
+        real = path.resolve()
     except (OSError, RuntimeError) as error:  # a circle of links, or a name too long
         raise PoolError(f"The path '{relative}' of the metadata is not readable.") from error
     if not any(real.is_relative_to(home) for home in homes):
@@ -53,10 +52,19 @@ def inside(root: Path, relative: str) -> Path:
     return path
 
 
-@lru_cache(maxsize=64)
-def _homes(root: Path) -> list[Path]:
-    """Folders the files of a data set may lie in."""
-    homes = [root.resolve(), *((root / name).resolve() for name in FOLDERS)]
-    if root.resolve().parent.name == "snapshots":
-        homes.append(root.resolve().parent.parent / "blobs")
-    return homes
+def homes_of(root: Path) -> tuple[Path, ...]:
+    """Return the folders the files of the data set in `root` may lie in.
+
+    Beside `root` these are what its owner made links of, of `FOLDERS`, and the folder `blobs` in
+    which the cache of the Hugging Face Hub keeps the content of files.
+
+    Raises:
+        PoolError: A link leads to itself.
+    """
+    try:
+        homes = [root.resolve(), *((root / name).resolve() for name in FOLDERS)]
+    except (OSError, RuntimeError) as error:
+        raise PoolError(f"The links in '{root}' are not readable.") from error
+    if homes[0].parent.name == "snapshots":
+        homes.append(homes[0].parent.parent / "blobs")
+    return tuple(homes)
