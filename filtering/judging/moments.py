@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from filtering.judging.explain import Clock, Counterpart, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.thresholds import Grouping, as_many_as_asked
-from filtering.moments.evidence import Stretch
+from filtering.moments.evidence.stretches import Stretch
 from filtering.moments.score import MomentFinding, MomentScore, score_comparable
 from filtering.moments.suitable import Comparable
 from filtering.vision.frame_features import sampled_frames

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, Match, how_far
-from filtering.moments.replaced import FOUND
+from filtering.moments.evidence.replaced import FOUND
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from filtering.moments.evidence import Trusted
+from filtering.moments.evidence.peers import Flags
 
 Array = NDArray[np.float64]
 
@@ -70,8 +70,8 @@ class Observed(NamedTuple):
 
 
 def judge(
-    evidence: Callable[[Trusted], Sequence[Observed]], count: int
-) -> tuple[Trusted, list[dict[str, Array]]]:
+    evidence: Callable[[Flags], Sequence[Observed]], count: int
+) -> tuple[Flags, list[dict[str, Array]]]:
     """Find whom to trust; return it, (D,), and the exceedances per camera and kind, (D,) each.
 
     Trust once lost does not return, and is not taken from more than half of the demonstrations.
@@ -93,7 +93,7 @@ def judge(
     return trusted, exceeded
 
 
-def exceedances(kind: str, observed: Observed, trusted: Trusted) -> Array:
+def exceedances(kind: str, observed: Observed, trusted: Flags) -> Array:
     """Return (D,): z, how far evidence lies above what is usual among the trusted.
 
     Args:

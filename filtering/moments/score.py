@@ -19,20 +19,13 @@ from filtering.moments.decision import (
     strengths_of,
     telling,
 )
-from filtering.moments.effects import View, ineffective, observe
-from filtering.moments.evidence import (
-    Evidence,
-    Reference,
-    Strange,
-    Stretch,
-    Trusted,
-    missing_order_extra,
-    moves_between,
-    references_of,
-    share_of_one_order,
-    strange_in,
-    variety_of,
-)
+from filtering.moments.evidence.effects import View, ineffective, observe
+from filtering.moments.evidence.kinds import missing_order_extra
+from filtering.moments.evidence.orders import moves_between, share_of_one_order, variety_of
+from filtering.moments.evidence.peers import Flags, Peers, looks_of
+from filtering.moments.evidence.strange import Strange, strange_in
+from filtering.moments.evidence.stretches import Evidence, Stretch
+from filtering.moments.evidence.usual import Reference, references_of
 from filtering.moments.suitable import Comparable, check_videos, comparable
 from filtering.moments.vectors import Video
 from filtering.vision.frame_features import FrameSource, frame_features
@@ -153,12 +146,12 @@ def gather(
     references: Sequence[Reference],
     strange: Sequence[Strange],
     views: Sequence[View],
-    trusted: Trusted,
+    peers: Peers,
 ) -> dict[str, Evidence]:
-    """Return the evidence of every kind that one camera gives, measured by the trusted."""
+    """Return the evidence of every kind that one camera gives, measured by the peers."""
     kinds = (
         *missing_order_extra(references, strange),
-        ineffective(found, views, trusted),
+        ineffective(found, views, peers),
     )
     return dict(zip(KINDS, kinds, strict=True))
 
@@ -170,16 +163,18 @@ def _judged(
 ) -> MomentScore:
     """Put cameras and kinds together."""
     cameras = list(found)
-    strange = {camera: strange_in(one) for camera, one in found.items()}
+    looks = {camera: looks_of(one) for camera, one in found.items()}
+    strange = {camera: strange_in(one, looks[camera]) for camera, one in found.items()}
     evidence: dict[str, dict[str, Evidence]] = {}
     one_order: dict[str, float] = {}  # known since the first round, which trusts everybody
 
-    def values(trusted: Trusted) -> list[Observed]:
+    def values(trusted: Flags) -> list[Observed]:
         moves = {}
         for camera in cameras:
-            references = references_of(found[camera], trusted)
+            peers = Peers(trusted, looks[camera])
+            references = references_of(found[camera], peers)
             evidence[camera] = gather(
-                found[camera], references, strange[camera], views[camera], trusted
+                found[camera], references, strange[camera], views[camera], peers
             )
             moves[camera] = moves_between(references)
         if trusted.all():

@@ -11,9 +11,11 @@ from filtering.moments.counterparts import (
     find_match,
 )
 from filtering.moments.decision import KINDS, Observed, exceedances, judge
-from filtering.moments.effects import states_of, usual_change
-from filtering.moments.evidence import moved, peak, usual_of, variety_of, worst
-from filtering.moments.replaced import Side, replaced
+from filtering.moments.evidence.effects import states_of, usual_change
+from filtering.moments.evidence.orders import variety_of
+from filtering.moments.evidence.replaced import Side, replaced
+from filtering.moments.evidence.stretches import peak, worst
+from filtering.moments.evidence.usual import moved, usual_of
 from filtering.moments.score import score_moments
 from filtering.moments.suitable import comparable
 from filtering.moments.vectors import Video, moment_vectors

@@ -26,7 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, how_far
-from filtering.moments.evidence import VARIETY, Evidence, Stretch, Trusted
+from filtering.moments.evidence.peers import Flags, Peers
+from filtering.moments.evidence.stretches import Evidence, Stretch
+from filtering.moments.evidence.usual import VARIETY
 from filtering.moments.vectors import Video
 
 Array = NDArray[np.float64]
@@ -111,24 +113,26 @@ class View:
     amounts: tuple[Amounts, ...]
     """(D, C) of each: how much of it each of D videos shows."""
 
-    def lacks(self, trusted: Trusted) -> Array:
-        """Return (T, D): how much less each video shows of each change than trusted ones do.
+    def lacks(self, peers: Peers) -> Array:
+        """Return (T, D): how much less each video shows of each change than others like it do.
 
         It is a logarithm of shares, 0 where a video shows what is usual.
         """
-        shares = np.stack([_share_lacking(amounts, trusted) for amounts in self.amounts])
+        shares = np.stack([_share_lacking(amounts, peers.trusted) for amounts in self.amounts])
         # What is lacked for less is a hand that passed, or a counterpart a little off.
         padded = np.pad(shares, ((0, LASTING - 1), (0, 0)), mode="edge")
         lasting = np.min([padded[k : k + len(shares)] for k in range(LASTING)], axis=0)
         lacks = -np.log(1 + LEAST_SHARE - np.clip(lasting, 0.0, 1.0))
-        return np.asarray(
-            lacks - np.quantile(lacks[:, trusted], 1 - VARIETY, axis=1, keepdims=True)
-        )
+        more = np.empty_like(lacks)
+        for members, others in peers.groups():
+            usual = np.quantile(lacks[:, others], 1 - VARIETY, axis=1, keepdims=True)
+            more[:, members] = lacks[:, members] - usual
+        return np.asarray(more)
 
 
-def ineffective(found: Counterparts, views: Sequence[View], trusted: Trusted) -> Evidence:
+def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evidence:
     """Return the evidence that nothing came of a step of each demonstration."""
-    lacks = [view.lacks(trusted) for view in views]
+    lacks = [view.lacks(peers) for view in views]
     results = [_lacking(found, views, lacks, d) for d in range(len(found.lengths))]
     values, own, other = zip(*results, strict=True)
     return Evidence(np.array(values), tuple(own), tuple(other))
@@ -236,7 +240,7 @@ def _around(found: Counterparts, row: int, d: int, moment: int, reach: int) -> t
     return _place(found, row, d, before), _place(found, row, d, after)
 
 
-def _share_lacking(amounts: Amounts, trusted: Trusted) -> Array:
+def _share_lacking(amounts: Amounts, trusted: Flags) -> Array:
     """Return (D,): share of a usual change that is not there, in the cells that lack most."""
     usual = np.median(amounts[trusted], axis=0)
     lacking = (usual - amounts) / (np.maximum(usual, 0.0) + NOISE)

@@ -1,0 +1,1 @@
+"""What counterparts and pictures say against each demonstration."""

@@ -1,0 +1,131 @@
+"""What is usual at each moment of a reference, and how far a demonstration departs from it."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, returned
+from filtering.moments.evidence.peers import Peers
+from filtering.moments.evidence.stretches import worst
+
+Array = NDArray[np.float64]
+
+VARIETY = 0.3
+"""Share of the trusted videos, rounded up, that makes a behaviour one of several usual ones."""
+RECOGNISED = 1.2
+"""Largest log of how much farther than usual a counterpart may be for its place to count: what is
+done at another place is done among other things."""
+
+
+FEWEST = 2
+"""Least number of videos that say what is usual, beside a reference and who is judged."""
+
+
+def references_of(found: Counterparts, peers: Peers) -> "list[Reference]":
+    """Return what is usual among the trusted, seen from each reference.
+
+    Args:
+        found: the counterparts.
+        peers: who says what is usual for whom.
+    """
+    return [Reference(found, row, peers) for row in range(len(found.references))]
+
+
+def rows_of(found: Counterparts, peers: Peers) -> list[int]:
+    """Return the rows of the trusted references; of all where too few are trusted."""
+    rows = [row for row, r in enumerate(found.references) if peers.trusted[r]]
+    return rows if len(rows) >= FEWEST else list(range(len(found.references)))
+
+
+def moved(at: NDArray[np.int64], sure: NDArray[np.bool_]) -> Array:
+    """Return (n,): the share of a video that each moment has passed in the other video.
+
+    That are the moments that came before it and come after it in the other, or the other way round.
+    Tempo, rests and what is left out elsewhere change nothing about it.
+
+    Args:
+        at: (n,) counterparts of the moments.
+        sure: (n,) True for counterparts that count; others are passed by nobody and pass nobody.
+    """
+    moments = np.arange(len(at))
+    earlier = moments[:, None] < moments[None, :]
+    later = at[:, None] > at[None, :] + ROUND_TRIP
+    passed = (earlier & later & sure[:, None]).sum(axis=0)
+    passing = (earlier & later & sure[None, :]).sum(axis=1)
+    return np.where(sure, (passed + passing) / len(at), 0.0)
+
+
+def usual_of(curves: NDArray[np.floating]) -> Array:
+    """Return (n,): what a share VARIETY of the demonstrations reaches.
+
+    Args:
+        curves: (K, n) of those who say what is usual. A reference and the demonstration that is
+            judged are counted in, and do not reach it.
+    """
+    need = int(np.ceil(VARIETY * (len(curves) + 2))) - 1
+    return np.asarray(np.sort(curves, axis=0)[-max(need, 1)], dtype=np.float64)
+
+
+class Reference:
+    """What is usual at each moment of one reference."""
+
+    def __init__(self, found: Counterparts, row: int, peers: Peers) -> None:
+        """Compare the trusted demonstrations with the reference of a row of `found`."""
+        self._peers = peers
+        self.number = found.references[row]
+        rows = rows_of(found, peers)
+        self.trusted = row in rows
+        """Whether the reference says itself what is usual."""
+        self._there, self._back = found.there[row], found.back[row]
+        others = [k for other in rows if (k := found.references[other]) != self.number]
+        self._rows = {k: place for place, k in enumerate(others)}
+        self._lacks = np.stack([self._match(k).contested for k in others])
+
+    def speaks_for(self, d: int) -> bool:
+        """Return whether it is one of those that say what is usual for d."""
+        return self.trusted and bool(self._peers.of(d)[self.number])
+
+    def lack(self, d: int) -> Array:
+        """Return (n,): how much farther than usual the counterparts in d are."""
+        return self._match(d).contested - usual_of(self._lacks[self._besides(d)])
+
+    def shift(self, d: int) -> Array:
+        """Return (n,): how much farther than usual the moments are moved in d."""
+        own = self._moved[self._rows[d]] if d in self._rows else self._moved_in(d)
+        return np.maximum(own - usual_of(self._moved[self._besides(d)]), 0.0)
+
+    def moves(self) -> dict[int, float]:
+        """Return how far steps move in each other trusted demonstration, by its number."""
+        return {k: worst(self._moved[place]) for k, place in self._rows.items()}
+
+    def at(self, d: int) -> NDArray[np.int64]:
+        """Return (n,): the counterparts in d."""
+        return self._match(d).at
+
+    def _besides(self, d: int) -> list[int]:
+        """Return the places of the trusted demonstrations that d is compared with."""
+        others = {k: place for k, place in self._rows.items() if k != d}
+        alike = self._peers.of(d)
+        near = [place for k, place in others.items() if alike[k]]
+        return near if len(near) >= FEWEST else list(others.values()) or [0]
+
+    @cached_property
+    def _moved(self) -> Array:
+        """(K, n) how far the moments are moved in each other trusted demonstration."""
+        return np.stack([self._moved_in(k) for k in self._rows])
+
+    @cached_property
+    def _median(self) -> NDArray[np.floating]:
+        return np.asarray(np.median(self._lacks, axis=0))
+
+    def _moved_in(self, d: int) -> Array:
+        match, back = self._match(d), self._back[d]
+        assert back is not None
+        near = match.contested - self._median < RECOGNISED
+        return moved(match.at, near & returned(match, back, ROUND_TRIP))
+
+    def _match(self, d: int) -> Match:
+        match = self._there[d]
+        assert match is not None
+        return match
