@@ -272,7 +272,7 @@ from the whole video.
 
     def _by_both(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:
         """Judge by sub-tasks and by moments; the graver verdict counts."""
-        from filtering.judging.combined import CONFIRMED, combine, doubts
+        from filtering.judging.combined import CONFIRMED, combine, doubts, unless_alone
         from filtering.moments.confirmed import confirmation
 
         by_segments = self._by_segments(pool, workers)
@@ -287,7 +287,7 @@ from the whole video.
         against = doubts(confirmed, score.one_order)
         self._notes += against
         self._knows_steps = confirmed >= CONFIRMED
-        norm = None if against else by_segments
+        norm = None if against else unless_alone(by_segments, score.strengths, score.kept)
         return self._cut(combine(norm, by_moments, pool.fps, self.config.groups))
 
     def _by_moments(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:

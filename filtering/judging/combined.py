@@ -6,7 +6,9 @@ no sub-task stands for, and need none. Either may flag:
     weight = min(w_norm, w_moments),    loss = -log weight.
 
 The norm is heard only where its sub-tasks are confirmed by counterparts, and where orders are not
-free: it would take rare orders for wrong ones.
+free: it would take rare orders for wrong ones. It needs a second witness too (`unless_alone`):
+that moments find the demonstration a little unusual, or, if it is out of order, that it keeps the
+order of less than half of the others. Sub-tasks that were cut wrongly in one video have none.
 """
 
 from dataclasses import replace
@@ -17,6 +19,7 @@ from filtering.judging.explain import explain
 from filtering.judging.judgement import Judgement
 from filtering.judging.norm.cut import NATURES
 from filtering.judging.thresholds import Grouping, as_many_as_asked
+from teasim.common.arrays import Array
 
 CONFIRMED = 0.85
 """Least agreement of sub-tasks with counterparts, see `confirmed.confirmation`. In pools of the
@@ -25,6 +28,11 @@ mixed up and correct videos accused."""
 ONE_ORDER = 0.3
 """Least share of the pairs of demonstrations that keep one order. With three camps of 6, 4 and 2 of
 12 it is 0.33; in the free-order pools of those scenes that the norm accuses it is 0.25 or less."""
+SUSPECT = 0.5
+"""Least strength of the evidence of moments, 1 at their cut, that makes them a witness. In the
+scenes TUNED_ON eleven of twelve whom the norm alone accused wrongly have less."""
+MAJORITY = 0.5
+"""Share of the others whose order a demonstration keeps, below which order is a witness."""
 LEAST_WEIGHT = 1e-9
 """Keeps the logarithm of a weight finite."""
 
@@ -47,6 +55,25 @@ def doubts(confirmed: float, one_order: float) -> tuple[str, ...]:
             "The found sub-tasks are not the same in all videos, so that only moments are judged."
         )
     return tuple(found)
+
+
+def unless_alone(norm: Judgement, strengths: Array, kept: Array) -> Judgement:
+    """Return the judgement of the norm with those kept whom nothing else speaks against.
+
+    Args:
+        norm: by sub-tasks, with named groups.
+        strengths: (D,) of the evidence of moments, 1 at their cut.
+        kept: (D,) share of the others whose order each keeps.
+    """
+    grouping = norm.grouping
+    in_order = np.array([name != NATURES[1] for name in grouping.names])[grouping.groups]
+    witnesses = (strengths >= SUSPECT) | (~in_order & (kept < MAJORITY))
+    return replace(
+        norm,
+        weights=np.where(witnesses, norm.weights, 1.0),
+        losses=np.where(witnesses, norm.losses, 0.0),
+        grouping=replace(grouping, groups=np.where(witnesses, grouping.groups, 0)),
+    )
 
 
 def combine(

@@ -21,7 +21,7 @@ from filtering.moments.decision import (
 )
 from filtering.moments.evidence.effects import View, ineffective, observe
 from filtering.moments.evidence.kinds import missing_order_extra
-from filtering.moments.evidence.orders import moves_between, share_of_one_order, variety_of
+from filtering.moments.evidence.orders import kept_orders, moves_between, variety_of
 from filtering.moments.evidence.peers import Flags, Peers, looks_of
 from filtering.moments.evidence.strange import Strange, strange_in
 from filtering.moments.evidence.stretches import Evidence, Stretch
@@ -77,8 +77,13 @@ class MomentScore:
     """Per camera that was of use."""
     structure: Mapping[str, float]
     """Per camera how much the videos have in common, see `suitable.shared_structure`."""
-    one_order: float
-    """Share of the pairs of demonstrations that keep one order, as most cameras see it."""
+    kept: Array
+    """(D,) share of the others whose order a demonstration keeps, as most cameras see it."""
+
+    @property
+    def one_order(self) -> float:
+        """Share of the pairs of demonstrations that keep one order."""
+        return float(self.kept.mean())
 
     @property
     def probabilities(self) -> Array:
@@ -166,7 +171,7 @@ def _judged(
     looks = {camera: looks_of(one) for camera, one in found.items()}
     strange = {camera: strange_in(one, looks[camera]) for camera, one in found.items()}
     evidence: dict[str, dict[str, Evidence]] = {}
-    one_order: dict[str, float] = {}  # known since the first round, which trusts everybody
+    kept: list[Array] = []  # known since the first round, which trusts everybody
 
     def values(trusted: Flags) -> list[Observed]:
         moves = {}
@@ -177,8 +182,8 @@ def _judged(
                 found[camera], references, strange[camera], views[camera], peers
             )
             moves[camera] = moves_between(references)
-        if trusted.all():
-            one_order.update({c: share_of_one_order(far) for c, far in moves.items()})
+            if trusted.all():
+                kept.append(kept_orders(references, len(trusted)))
         # Orders are free or not whoever looks; a camera that misses some steps sees less of it.
         variety = max(variety_of(far) for far in moves.values())
         return [
@@ -204,7 +209,7 @@ def _judged(
         tuple(findings),
         found,
         structure,
-        one_order=float(np.median(list(one_order.values()))),
+        kept=np.median(kept, axis=0),
     )
 
 

@@ -114,7 +114,7 @@ class View:
     """(D, C) of each: how much of it each of D videos shows."""
 
     def lacks(self, peers: Peers) -> Array:
-        """Return (T, D): how much less each video shows of each change than others like it do.
+        """Return (T, D): how much less each video shows of each change than others do.
 
         It is a logarithm of shares, 0 where a video shows what is usual.
         """
@@ -123,11 +123,14 @@ class View:
         padded = np.pad(shares, ((0, LASTING - 1), (0, 0)), mode="edge")
         lasting = np.min([padded[k : k + len(shares)] for k in range(LASTING)], axis=0)
         lacks = -np.log(1 + LEAST_SHARE - np.clip(lasting, 0.0, 1.0))
-        more = np.empty_like(lacks)
-        for members, others in peers.groups():
-            usual = np.quantile(lacks[:, others], 1 - VARIETY, axis=1, keepdims=True)
-            more[:, members] = lacks[:, members] - usual
-        return np.asarray(more)
+        usual = np.empty_like(lacks)
+        for members, alike in peers.groups():
+            among = [
+                np.quantile(lacks[:, those], 1 - VARIETY, axis=1)
+                for those in (peers.trusted, alike)
+            ]
+            usual[:, members] = np.max(among, axis=0)[:, None]
+        return np.asarray(lacks - usual)
 
 
 def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evidence:

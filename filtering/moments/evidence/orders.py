@@ -26,12 +26,21 @@ def moves_between(references: Sequence[Reference]) -> Array:
     NaN on the diagonal. Of the two that look at a pair, the one that sees less move counts.
     """
     trusted = [reference for reference in references if reference.trusted]
-    moves = np.full((len(trusted), len(trusted)), np.nan)
-    for row, reference in enumerate(trusted):
-        far = reference.moves()
-        for column, other in enumerate(trusted):
-            moves[row, column] = far.get(other.number, np.nan)
+    moves = np.array([[one.move(other.number) for other in trusted] for one in trusted])
     return np.fmin(moves, moves.T)
+
+
+def kept_orders(references: Sequence[Reference], count: int) -> Array:
+    """Return (D,): share of the other trusted references whose order each demonstration keeps.
+
+    Args:
+        references: what is usual.
+        count: D, the number of demonstrations.
+    """
+    trusted = [reference for reference in references if reference.trusted]
+    moves = np.array([[one.move(d) for d in range(count)] for one in trusted])
+    moves[:, [one.number for one in trusted]] = moves_between(references)
+    return np.asarray(np.nanmean(_in_one_order(moves), axis=0))
 
 
 def variety_of(moves: Array) -> float:
@@ -46,11 +55,6 @@ def variety_of(moves: Array) -> float:
     low, high = AGREED
     free = np.clip((high - kept[len(kept) // 2]) / (high - low), 0.0, 1.0)
     return float(free * np.nanquantile(moves, FREEST))
-
-
-def share_of_one_order(moves: Array) -> float:
-    """Return the share of the pairs of demonstrations that keep one order; see `moves_between`."""
-    return float(np.nanmean(_in_one_order(moves)))
 
 
 def _in_one_order(moves: Array) -> Array:

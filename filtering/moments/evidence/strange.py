@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, Match
-from filtering.moments.evidence.peers import Flags, Looks, everybody
+from filtering.moments.evidence.peers import Flags, Looks, Peers, everybody
 from filtering.moments.evidence.replaced import Side
 from filtering.moments.evidence.usual import FEWEST
 
@@ -30,13 +30,28 @@ class Strange:
 
 
 def strange_in(found: Counterparts, looks: Looks) -> list[Strange]:
-    """Return per demonstration how strange its moments are among those alike, whoever is trusted.
+    """Return per demonstration how strange its moments are, whoever is trusted.
+
+    They are no stranger than among all demonstrations, nor than among those of its look.
 
     Args:
         found: the counterparts.
         looks: (D,) the same number for demonstrations that look alike.
     """
-    everyone = everybody(looks)
+    among = [_strange_among(found, everybody(np.zeros_like(looks)))]
+    if looks.any():
+        among.append(_strange_among(found, everybody(looks)))
+    return [_least(one) for one in zip(*among, strict=True)]
+
+
+def _least(among: Sequence[Strange]) -> Strange:
+    """Return how strange a demonstration is where it is so least; the sides are of the first."""
+    ways = zip(*(one.curves for one in among), strict=True)
+    return Strange(among[0].sides, tuple(np.min(way, axis=0) for way in ways))
+
+
+def _strange_among(found: Counterparts, everyone: Peers) -> list[Strange]:
+    """Return per demonstration how strange its moments are among its peers."""
     well = [
         _found_well(row, everyone.of(r))
         for r, row in zip(found.references, found.there, strict=True)

@@ -81,6 +81,7 @@ class Reference:
         others = [k for other in rows if (k := found.references[other]) != self.number]
         self._rows = {k: place for place, k in enumerate(others)}
         self._lacks = np.stack([self._match(k).contested for k in others])
+        self._known: dict[int, Array] = {}
 
     def speaks_for(self, d: int) -> bool:
         """Return whether it is one of those that say what is usual for d."""
@@ -88,27 +89,34 @@ class Reference:
 
     def lack(self, d: int) -> Array:
         """Return (n,): how much farther than usual the counterparts in d are."""
-        return self._match(d).contested - usual_of(self._lacks[self._besides(d)])
+        return self._match(d).contested - self._usual(self._lacks, d)
 
     def shift(self, d: int) -> Array:
         """Return (n,): how much farther than usual the moments are moved in d."""
-        own = self._moved[self._rows[d]] if d in self._rows else self._moved_in(d)
-        return np.maximum(own - usual_of(self._moved[self._besides(d)]), 0.0)
+        return np.maximum(self._moved_in(d) - self._usual(self._moved, d), 0.0)
 
-    def moves(self) -> dict[int, float]:
-        """Return how far steps move in each other trusted demonstration, by its number."""
-        return {k: worst(self._moved[place]) for k, place in self._rows.items()}
+    def move(self, d: int) -> float:
+        """Return how far steps move in d, NaN for itself [length of a video]."""
+        return np.nan if d == self.number else worst(self._moved_in(d))
 
     def at(self, d: int) -> NDArray[np.int64]:
         """Return (n,): the counterparts in d."""
         return self._match(d).at
 
-    def _besides(self, d: int) -> list[int]:
-        """Return the places of the trusted demonstrations that d is compared with."""
+    def _usual(self, curves: NDArray[np.floating], d: int) -> Array:
+        """Return (n,): what is usual for d among all trusted demonstrations or those of its look.
+
+        Args:
+            curves: (K, n) of the trusted ones, in the order of `_rows`.
+            d: who is judged.
+        """
         others = {k: place for k, place in self._rows.items() if k != d}
         alike = self._peers.of(d)
         near = [place for k, place in others.items() if alike[k]]
-        return near if len(near) >= FEWEST else list(others.values()) or [0]
+        usual = usual_of(curves[list(others.values()) or [0]])
+        if FEWEST <= len(near) < len(others):
+            usual = np.maximum(usual, usual_of(curves[near]))
+        return usual
 
     @cached_property
     def _moved(self) -> Array:
@@ -120,10 +128,13 @@ class Reference:
         return np.asarray(np.median(self._lacks, axis=0))
 
     def _moved_in(self, d: int) -> Array:
-        match, back = self._match(d), self._back[d]
-        assert back is not None
-        near = match.contested - self._median < RECOGNISED
-        return moved(match.at, near & returned(match, back, ROUND_TRIP))
+        """Return (n,): how far the moments are moved in d."""
+        if d not in self._known:
+            match, back = self._match(d), self._back[d]
+            assert back is not None
+            near = match.contested - self._median < RECOGNISED
+            self._known[d] = moved(match.at, near & returned(match, back, ROUND_TRIP))
+        return self._known[d]
 
     def _match(self, d: int) -> Match:
         match = self._there[d]

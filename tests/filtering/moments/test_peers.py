@@ -1,0 +1,72 @@
+"""Which videos look alike, and who says what is usual for whom."""
+
+import numpy as np
+import pytest
+
+from filtering.moments.counterparts import compare
+from filtering.moments.evidence.peers import Peers, looks_of
+from filtering.moments.score import score_moments
+from tests.filtering.moments.toy_videos import FEATURES, STEPS, toy_video
+
+HAND = np.random.default_rng(5).normal(0, 1, (3, FEATURES)).astype(np.float32)
+"""What another hand changes: something at all times, and more while it moves about."""
+
+
+def pool(hands, orders=None):
+    """Videos by the hand, 0 or 1, that each shows; all steps in order unless told otherwise."""
+    orders = orders or [range(STEPS)] * len(hands)
+    videos = [toy_video(order, seed) for seed, order in enumerate(orders)]
+    for video, hand in zip(videos, hands, strict=True):
+        here = np.tanh(video.looks @ HAND[1:].T / 4)  # (n, 2) where in the picture it is
+        video.looks[:] += hand * (HAND[0] + here @ HAND[1:])
+    return videos
+
+
+def found_in(videos):
+    return compare([video.looks for video in videos], range(len(videos)))
+
+
+def test_videos_of_two_hands_look_different():
+    hands = [0, 1, 0, 0, 1, 0, 0, 1, 0, 0]
+    looks = looks_of(found_in(pool(hands)))
+    assert len(set(looks)) == 2
+    assert all(len({looks[d] for d in range(10) if hands[d] == hand}) == 1 for hand in (0, 1))
+
+
+@pytest.mark.parametrize("hands", [[0] * 10, [0] * 8 + [1] * 2])
+def test_one_hand_or_two_videos_of_another_are_one_look(hands):
+    assert set(looks_of(found_in(pool(hands)))) == {0}
+
+
+def test_what_is_left_out_makes_no_look():
+    orders = [range(STEPS)] * 6 + [[0, 3, 4]] * 4
+    assert set(looks_of(found_in(pool([0] * 10, orders)))) == {0}
+
+
+def test_videos_that_are_no_references_have_the_look_of_the_nearest():
+    hands = [0, 1] * 6
+    found = compare([video.looks for video in pool(hands)], [0, 1, 2, 3, 4, 5])
+    looks = looks_of(found)
+    assert looks.tolist() in ([0, 1] * 6, [1, 0] * 6)
+
+
+def test_peers_are_the_trusted_of_the_same_look_if_there_are_enough():
+    peers = Peers(np.array([True] * 5 + [False]), np.array([0, 0, 0, 1, 1, 1]))
+    assert peers.of(0).tolist() == [True] * 3 + [False] * 3
+    assert peers.of(5).tolist() == [True] * 5 + [False]
+    assert [members.tolist() for members, _ in peers.groups()] == [
+        [True] * 3 + [False] * 3,
+        [False] * 3 + [True] * 3,
+    ]
+
+
+def test_a_few_correct_videos_of_another_hand_are_not_accused():
+    hands = [1, 1, 1, 1, *[0] * 8]
+    assert not score_moments({"front": pool(hands)}).flagged.any()
+
+
+def test_a_mistake_is_found_among_videos_of_its_own_hand():
+    hands = [1, 1, 1, 1, *[0] * 8]
+    orders = [[0, 1, 3, 4], *[range(STEPS)] * 11]
+    flagged = score_moments({"front": pool(hands, orders)}).flagged
+    assert flagged.tolist() == [True] + [False] * 11
