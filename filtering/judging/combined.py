@@ -28,9 +28,9 @@ mixed up and correct videos accused."""
 ONE_ORDER = 0.3
 """Least share of the pairs of demonstrations that keep one order. With three camps of 6, 4 and 2 of
 12 it is 0.33; in the free-order pools of those scenes that the norm accuses it is 0.25 or less."""
-SUSPECT = 0.5
+SUSPECT = 0.7
 """Least strength of the evidence of moments, 1 at their cut, that makes them a witness. In the
-scenes TUNED_ON eleven of twelve whom the norm alone accused wrongly have less."""
+scenes TUNED_ON nearly all whom the norm alone accuses wrongly have less."""
 MAJORITY = 0.5
 """Share of the others whose order a demonstration keeps, below which order is a witness."""
 LEAST_WEIGHT = 1e-9

@@ -12,7 +12,7 @@ FRAMES = 20
 SEEN, PIXELS = 20, 15
 """Change of a pixel that is seen, 0..255, and how many such pixels an effect has to have."""
 
-GANTRIES = ("tabletop", "stack", "drawers")
+GANTRIES = ("tabletop", "stack", "drawers", "lunch")
 """Scenes that MuJoCo renders: each of their worlds takes a while to build."""
 
 each_scene = pytest.mark.parametrize("scene", SCENES.values(), ids=list(SCENES))
