@@ -287,7 +287,9 @@ from the whole video.
         against = doubts(confirmed, score.one_order)
         self._notes += against
         self._knows_steps = confirmed >= CONFIRMED
-        norm = None if against else unless_alone(by_segments, score.strengths, score.kept)
+        norm = None if against else by_segments
+        if norm and self.chosen_.segmenter == CLUSTERING:
+            norm = unless_alone(norm, score.strengths, score.kept)
         return self._cut(combine(norm, by_moments, pool.fps, self.config.groups))
 
     def _by_moments(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:

@@ -6,9 +6,10 @@ no sub-task stands for, and need none. Either may flag:
     weight = min(w_norm, w_moments),    loss = -log weight.
 
 The norm is heard only where its sub-tasks are confirmed by counterparts, and where orders are not
-free: it would take rare orders for wrong ones. It needs a second witness too (`unless_alone`):
-that moments find the demonstration a little unusual, or, if it is out of order, that it keeps the
-order of less than half of the others. Sub-tasks that were cut wrongly in one video have none.
+free: it would take rare orders for wrong ones. On sub-tasks that clustering found it needs a second
+witness too (`unless_alone`): that moments find the demonstration a little unusual, or, if it is out
+of order, that it keeps the order of less than half of the others. Sub-tasks that were cut wrongly
+in one video have none.
 """
 
 from dataclasses import replace
