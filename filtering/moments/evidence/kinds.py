@@ -10,13 +10,14 @@ share VARIETY of the trusted videos reach, and W_k the quantile WELL over all vi
 
 Order counts only where the counterpart of the counterpart is the moment itself: rests look all
 alike. What a share VARIETY of the videos does, an optional step left out or another legal order, is
-thus never evidence. Each curve is summed up by the mean of its largest twelfth over t, because a
-step is a part of a video; missing and order by the median over the trusted references, because a
+thus never evidence; nor is what is usual among the demonstrations of the same look, see `peers`.
+Each curve is summed up by the mean of its largest twelfth over t, because a step is a part of a
+video; missing and order by the median over the trusted references of the same look, because a
 reference may be incorrect too; extra by the quantile SHARED over all of them, so that trust does
-not change it. Extra is also found
-from plain nearest moments in place of counterparts, and the larger value counts: a step done twice
-is seen in contested places alone, and one that nobody else does better in plain ones. Missing and
-extra count less the more of the stretch is replaced, see `replaced`.
+not change it. Extra is also found from plain nearest moments in place of counterparts, and the
+larger value counts: a step done twice is seen in contested places alone, and one that nobody else
+does better in plain ones. Missing and extra count less the more of the stretch is replaced, see
+`replaced`.
 """
 
 from collections.abc import Sequence
