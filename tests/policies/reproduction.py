@@ -1,5 +1,6 @@
 """Stand-ins for the slow work of a reproduction: results of the right form within a millisecond."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from policies.experiments.reproduce.methods import (
     Question,
     judge_all,
     judge_thresholds,
+    norm,
     weigh_all,
 )
 from policies.experiments.reproduce.plan import Plan, Size
@@ -62,16 +64,18 @@ def fake_segmentation(unit, store, workers):
 
 
 def fake_detection(unit, store, workers):
-    said = judged(unit.kind, tuple((kind, count) for kind, count in unit.spec["kinds"]))
+    kinds = tuple((kind, count) for kind, count in unit.spec["kinds"])
+    said = judged(unit.kind, kinds, unit.spec["ours"])
     return {"pools": [said] * unit.spec["pools"]}
 
 
 @lru_cache  # SLSQP takes a second
-def judged(work, kinds):
+def judged(work, kinds, looks):
     judge = {"detection": judge_all, "thresholds": judge_thresholds, "weights": weigh_all}
     places = np.repeat(range(len(kinds)), [count for _, count in kinds])
     names = tuple(f"demo{place}" for place in range(len(places)))
-    return judge[work](Question(evidence(kinds), places, names))
+    question = Question(evidence(kinds), places, names)
+    return judge[work](replace(question, ours=norm(question)) if looks else question)
 
 
 def fake_policies(unit, store, workers):

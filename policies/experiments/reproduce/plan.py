@@ -43,6 +43,8 @@ SECONDS_PER_POOL = 3.0
 """Judging a pool by all methods, mostly SLSQP [s]."""
 SECONDS_PER_CLUSTERED = 9.0
 """Clustering the videos of a pool and judging it [s]."""
+SECONDS_PER_FILTERED = 12.0
+"""Judging a pool by the default filter, the videos looked at already [s]."""
 SECONDS_PER_EPISODE = 2.0
 """An episode of a policy [s]; episodes that repeat another's decisions are nearly free."""
 

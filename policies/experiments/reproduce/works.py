@@ -8,6 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from filtering.config import FilterConfig
+from filtering.demo_filter import DemoFilter
 from filtering.segmentation.config import FitConfig, MSTCNConfig
 from filtering.segmentation.fit import fit_segmenter
 from filtering.segmentation.metrics import (
@@ -22,6 +24,7 @@ from policies.experiments.generating import generate_pool
 from policies.experiments.reproduce.exhibits.policies import run_policies
 from policies.experiments.reproduce.exhibits.salads import judge_salads
 from policies.experiments.reproduce.methods import (
+    Answer,
     Question,
     judge_all,
     judge_thresholds,
@@ -96,8 +99,21 @@ def judge_pools(
         reading, own = _reading(unit, store, pool, places)
         kinds = np.repeat(range(len(spec["kinds"])), [count for _, count in spec["kinds"]])
         names = tuple(pool.episodes[place].demo_id for place in places)
-        judged.append(judge(Question(reading.evidence(own), kinds, names, number)))
+        ours = judge_videos(pool.only(places), _segmenter(unit, store)) if spec["ours"] else None
+        judged.append(judge(Question(reading.evidence(own), kinds, names, number, ours)))
     return {"pools": judged}
+
+
+def judge_videos(pool: Pool, segmenter: str) -> Answer:
+    """Judge a pool as `teasim filter` does, with a segmenter of its own."""
+    found = DemoFilter(FilterConfig(segmenter=segmenter)).fit(pool)
+    return Answer(found.flagged_, found.losses_, found.probabilities_)
+
+
+def _segmenter(unit: Unit, store: Store) -> str:
+    """Return the segmenter of a unit: the folder of its network, or the name of one."""
+    needs = unit.needs
+    return str(store.folder_of(needs["network"]) if "network" in needs else unit.spec["segmenter"])
 
 
 def _reading(

@@ -16,7 +16,7 @@ from policies.experiments.reproduce.exhibits.detecting import (
 )
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
 from policies.experiments.reproduce.exhibits.segmenting import frame_rate
-from policies.experiments.reproduce.methods import LEARNED, OURS, THRESHOLDS
+from policies.experiments.reproduce.methods import LEARNED, NORM, THRESHOLDS
 from policies.experiments.reproduce.plan import ROBOT_LEVEL, Plan
 from policies.experiments.units import Store, Unit
 
@@ -25,7 +25,7 @@ KINDS: dict[str, tuple[int, tuple[tuple[str, int], ...]]] = {
     "10 Seq_1 + 4 Seq_3": (301, (("seq_1", 10), ("seq_3", 4))),
 }
 """Pools, with the number from which they are drawn."""
-METHODS = (OURS, LEARNED, *(f"equation 3, {name}" for name in THRESHOLDS))
+METHODS = (NORM, LEARNED, *(f"equation 3, {name}" for name in THRESHOLDS))
 """Methods of the work `thresholds`."""
 
 

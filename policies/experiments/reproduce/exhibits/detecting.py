@@ -6,7 +6,7 @@ from typing import Any
 
 from policies.experiments.detection import DetectionScores, Judged, detection_scores
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
-from policies.experiments.reproduce.methods import METHODS, OURS
+from policies.experiments.reproduce.methods import OURS
 from policies.experiments.reproduce.paper import (
     CORRECT,
     DETECTION,
@@ -15,7 +15,9 @@ from policies.experiments.reproduce.paper import (
 )
 from policies.experiments.reproduce.plan import (
     PEOPLE_LEVEL,
+    ROBOT_LEVEL,
     SECONDS_PER_CLUSTERED,
+    SECONDS_PER_FILTERED,
     SECONDS_PER_POOL,
     SEGMENTERS,
     UNLABELLED,
@@ -49,13 +51,16 @@ def pools_unit(
     size = plan.size
     pools = size.clustered if segmenter == UNLABELLED else size.pools
     each = SECONDS_PER_CLUSTERED if segmenter == UNLABELLED else SECONDS_PER_POOL
+    whole = work == "detection" and segmenter != ROBOT_LEVEL
     spec = {
         "kinds": [list(kind) for kind in kinds],
         "segmenter": segmenter,
         "row": 1000 * plan.seed + row,
         "pools": pools,
         "frames": size.frames,
+        "ours": whole,
     }
+    each += whole * SECONDS_PER_FILTERED
     needs = {"bank": plan.bank("robot"), **plan.segmenter(segmenter)}
     return Unit(work, spec, needs, pools * each)
 
@@ -63,6 +68,11 @@ def pools_unit(
 def judged_by(unit: Unit, store: Store, method: str) -> list[Judged]:
     """Return what a method said about the pools of a unit that is done."""
     return [Judged.from_json(pool[method]) for pool in store.read(unit)["pools"]]
+
+
+def methods_of(unit: Unit, store: Store) -> list[str]:
+    """Return the methods that judged the pools of a unit that is done."""
+    return list(store.read(unit)["pools"][0])
 
 
 def percent(rate: Rate) -> str:
@@ -124,7 +134,7 @@ def table(plan: Plan, store: Store, name: str) -> Table:
     for number, printed in enumerate(DETECTION[name]):
         for segmenter in segmenters(plan, printed.k):
             unit = _unit(plan, name, number, segmenter)
-            for method in METHODS:
+            for method in methods_of(unit, store):
                 scores = detection_scores(judged_by(unit, store, method))
                 rows.append(
                     {

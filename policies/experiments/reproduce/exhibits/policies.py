@@ -30,6 +30,10 @@ LEARNERS = ("bc", "bc-rnn", "demodice", "r-maxent")
 """Learners of the figure."""
 UNFILTERED, FILTERED = "all", "filtered"
 """Training sets of the figure: all demonstrations, and those that the filter does not flag."""
+OBSERVE = "pixels_agent_pos"
+"""What the policies see: pictures of the cameras, and the joint positions."""
+CAMERAS = ("left", "cup")
+"""Cameras that film the pools; what is in the cup shows in the second one."""
 EXPERTS = 2
 """Demonstrations that DemoDICE is told to be good, the first that are labelled correct."""
 POOL_SEED = FIRST_SEED + 100
@@ -44,13 +48,14 @@ def units(plan: Plan) -> dict[int, Unit]:
 def _unit(plan: Plan, k: int) -> Unit:
     size = plan.size
     seed = POOL_SEED + 100 * plan.seed + k
-    pool = {"seq1": CORRECT, "seq3": k, **FILMED, "seed": seed}
+    pool = {"seq1": CORRECT, "seq3": k, **FILMED, "camera": list(CAMERAS), "seed": seed}
     spec = {
         "pool": pool,
         "learners": list(LEARNERS),
         "seeds": list(range(size.training_seeds)),
         "episodes": size.episodes,
         "experts": EXPERTS,
+        "observe": OBSERVE,
     }
     policies = 3 * len(LEARNERS) * size.training_seeds
     seconds = (CORRECT + k) * (SECONDS_PER_DEMO + SECONDS_PER_VIDEO)
@@ -72,13 +77,15 @@ def config_of(unit: Unit, network: Path) -> AblationConfig:
         pools=(PoolVariant("pool", options=spec["pool"]),),
         filters=(
             FilterVariant(UNFILTERED, "ignore"),
-            FilterVariant(FILTERED, "discard", FilterConfig(segmenter=str(network))),
+            FilterVariant(
+                FILTERED, "discard", FilterConfig(segmenter=str(network), cameras=CAMERAS[:1])
+            ),
             FilterVariant("oracle", "labels"),
         ),
         learners=tuple(LearnerVariant(name, name) for name in spec["learners"]),
         seeds=tuple(spec["seeds"]),
         experts=spec["experts"],
-        observe="state",
+        observe=spec["observe"],
         episodes=spec["episodes"],
     )
 
@@ -122,7 +129,7 @@ def table(plan: Plan, store: Store) -> Table:
     words += [_sentence(rows, learner, mode) for learner in LEARNERS for mode in MODES]
     note = (
         f"Ours judges the videos by segments of {SEGMENTERS[PEOPLE_LEVEL]}; policies learn the "
-        "next sub-task from the state and the logged sub-tasks. Differences are to all "
+        "next sub-task from pictures, joint positions and the logged sub-tasks. Differences are to all "
         "demonstrations, in the same scenes, with 95 % intervals. The oracle leaves out what is "
         "labelled incorrect."
     )

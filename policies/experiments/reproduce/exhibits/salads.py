@@ -20,7 +20,7 @@ from policies.experiments.reproduce.exhibits.detecting import (
     score_cells,
 )
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
-from policies.experiments.reproduce.methods import METHODS, OURS, Question, judge_all
+from policies.experiments.reproduce.methods import METHODS, NORM, Question, judge_all
 from policies.experiments.reproduce.paper import (
     CORRECT,
     DETECTION,
@@ -167,7 +167,7 @@ def table(plan: Plan, store: Store) -> Table:
                     "paper accuracy": printed[k].accuracy,
                 }
             )
-            if method == OURS:
+            if method == NORM:
                 words.append(against(f"{CORRECT} + {k}, {steps}", scores, printed[k]))
     return Table(rows, words, notes=(INTERVALS,))
 
