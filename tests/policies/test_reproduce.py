@@ -63,7 +63,7 @@ def test_every_exhibit_has_rows_sentences_and_files(store, name):
     exhibit = EXHIBITS[name]
     table = exhibit.table(PLAN, store)
     text = as_markdown(name, exhibit, table, store.command)
-    page = as_html(name, exhibit, table, store.command)
+    page = as_html(name, exhibit, table, store.command, {shows: "a.svg" for shows in table.figures})
     assert f"    {store.command}\n" in text
     assert store.command in page
     if table.not_run:
@@ -71,6 +71,8 @@ def test_every_exhibit_has_rows_sentences_and_files(store, name):
         assert not table.rows
         return
     assert table.words
+    assert page.count("<img ") == len(table.figures)
+    assert bool(table.figures) == name.startswith(("figure", "appendix"))
     assert all(list(row) == table.columns for row in table.rows)
     rows = list(csv.DictReader(csv_text(table.rows).splitlines()))
     assert len(rows) == len(table.rows)

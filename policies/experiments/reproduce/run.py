@@ -1,5 +1,6 @@
 """The verb `reproduce`: the work, then a page, and a CSV and Markdown file for every exhibit."""
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from policies.experiments.tabular import html_page, write_rows
 from policies.experiments.units import Store, Unit, do_units, missing
 from policies.settings import ReproduceSettings
 from teasim.common.errors import ConfigError
+from teasim.common.figures import can_draw, save_figures
 from teasim.common.files import write_text
 from teasim.common.registry import named
 
@@ -81,16 +83,29 @@ def cost(units: Sequence[Unit], store: Store, jobs: int) -> str:
 def write_pages(
     out: Path, chosen: Mapping[str, Exhibit], tables: Mapping[str, Table], command: str
 ) -> None:
-    """Write NAME.csv, NAME.parquet and NAME.md for every exhibit, and index.html over them."""
+    """Write NAME.csv, NAME.parquet and NAME.md for every exhibit, and index.html over them.
+
+    Figures are written beside them where matplotlib is installed.
+    """
     sections = []
     for name, exhibit in chosen.items():
         table = tables[name]
         write_text(out / f"{name}.md", as_markdown(name, exhibit, table, command))
         if not table.not_run:
             write_rows(out, name, table.rows)
-        sections.append(as_html(name, exhibit, table, command))
+        pictures = draw_figures(out, name, table) if can_draw() else {}
+        sections.append(as_html(name, exhibit, table, command, pictures))
     title = "Tables and figures of Hussein & Begum (CoRL 2022)"
     write_text(out / "index.html", html_page(title, sections))
+
+
+def draw_figures(out: Path, name: str, table: Table) -> dict[str, str]:
+    """Write the figures of an exhibit, and return their paths in `out` by what they show."""
+    files = {
+        shows: "-".join([name, *re.findall(r"[a-z0-9]+", shows.lower())]) for shows in table.figures
+    }
+    save_figures(out, {files[shows]: drawing for shows, drawing in table.figures.items()})
+    return {shows: f"{file}.svg" for shows, file in files.items()}
 
 
 def summary(tables: Mapping[str, Table], out: Path) -> str:
@@ -99,6 +114,8 @@ def summary(tables: Mapping[str, Table], out: Path) -> str:
     for name, table in tables.items():
         lines.append(f"{name}:")
         lines += [f"  {sentence}" for sentence in (table.words or [f"not run: {table.not_run}"])]
+    if not can_draw():
+        lines.append("No figures: they need matplotlib; run 'pip install teasim[figures]'.")
     return "\n".join([*lines, f"page: {out / 'index.html'}"])
 
 

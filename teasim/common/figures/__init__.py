@@ -6,7 +6,7 @@ from types import MappingProxyType
 from teasim.common.figures.accuracy import AccuracyFigure
 from teasim.common.figures.confusion import ConfusionFigure
 from teasim.common.figures.curves import CurvesFigure
-from teasim.common.figures.drawing import Drawing, check_figures, save_figures
+from teasim.common.figures.drawing import Drawing, can_draw, check_figures, save_figures
 from teasim.common.figures.precedence import PrecedenceFigure
 from teasim.common.figures.reliability import ReliabilityFigure
 from teasim.common.figures.timelines import Bar, TimelinesFigure
@@ -36,6 +36,7 @@ __all__ = [
     "ReliabilityFigure",
     "TimelinesFigure",
     "WeightsFigure",
+    "can_draw",
     "check_figures",
     "save_figures",
 ]

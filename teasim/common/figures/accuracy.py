@@ -14,8 +14,8 @@ SHIFT = 0.08
 class Point:
     """A measured share with its interval."""
 
-    k: int
-    """Incorrect demonstrations in the pool."""
+    k: float
+    """Incorrect demonstrations in the pool, or what else the figure is drawn over."""
     value: float
     """Share in [0, 1]."""
     low: float
@@ -32,6 +32,8 @@ class AccuracyFigure:
     """Points by name."""
     measure: str = "policy accuracy"
     """What is measured."""
+    across: str = "incorrect demonstrations K"
+    """What K is."""
 
     @property
     def size(self) -> tuple[float, float]:
@@ -59,6 +61,7 @@ class AccuracyFigure:
                 label=name,
             )
         axes.grid(axis="y")
-        axes.set_xticks(sorted({p.k for points in self.series.values() for p in points}))
-        axes.set(xlabel="incorrect demonstrations K", ylabel=f"{self.measure} [%]", ylim=(0, 103))
+        places = {round(p.k, 1) for points in self.series.values() for p in points}
+        axes.set_xticks(sorted(int(k) if k == int(k) else k for k in places))
+        axes.set(xlabel=self.across, ylabel=f"{self.measure} [%]", ylim=(0, 103))
         axes.figure.legend(loc="outside upper center", ncols=min(3, len(self.series)))

@@ -46,6 +46,11 @@ class Drawing(Protocol):
         """Draw on matplotlib's Axes."""
 
 
+def can_draw() -> bool:
+    """Return whether matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
 def check_figures(folder: Path | None) -> None:
     """Refuse figures that could not be written; called before the work. None asks for none.
 
@@ -54,7 +59,7 @@ def check_figures(folder: Path | None) -> None:
     """
     if folder is None:
         return
-    if find_spec("matplotlib") is None:
+    if not can_draw():
         raise ConfigError(
             "Figures need matplotlib, which is not installed; run 'pip install teasim[figures]' or "
             "leave out --figures."

@@ -19,6 +19,8 @@ from policies.experiments.reproduce.exhibits.segmenting import frame_rate
 from policies.experiments.reproduce.methods import LEARNED, NORM, THRESHOLDS
 from policies.experiments.reproduce.plan import ROBOT_LEVEL, Plan
 from policies.experiments.units import Store, Unit
+from teasim.common.figures import AccuracyFigure
+from teasim.common.figures.accuracy import Point
 
 KINDS: dict[str, tuple[int, tuple[tuple[str, int], ...]]] = {
     "10 Seq_1 + 4 Seq_2": (300, (("seq_1", 10), ("seq_2", 4))),
@@ -50,10 +52,15 @@ def pairs(plan: Plan) -> dict[tuple[str, str], tuple[Unit, Unit]]:
 def table(plan: Plan, store: Store) -> Table:
     """Return a row per network, pool and method, in the order of the right frames."""
     rows: list[dict[str, Any]] = []
+    points: dict[str, dict[str, list[Point]]] = {pool: {} for pool in KINDS}
     for (name, pool), (tested, judged) in pairs(plan).items():
         right = frame_rate([store.read(tested)])
         for method in METHODS:
             scores = detection_scores(judged_by(judged, store, method))
+            accuracy = scores.accuracy
+            points[pool].setdefault(method, []).append(
+                Point(100 * right.value, accuracy.value, accuracy.low, accuracy.high)
+            )
             rows.append(
                 {
                     "network fitted to": name,
@@ -66,7 +73,16 @@ def table(plan: Plan, store: Store) -> Table:
                 }
             )
     rows.sort(key=lambda row: row["frames right [%]"])
-    return Table(rows, [_sentence(rows, method) for method in METHODS], notes=(INTERVALS,))
+    words = [_sentence(rows, method) for method in METHODS]
+    figures = {
+        pool: AccuracyFigure(
+            {method: tuple(found) for method, found in series.items()},
+            measure="demonstrations judged rightly",
+            across="frames segmented rightly [%]",
+        )
+        for pool, series in points.items()
+    }
+    return Table(rows, words, notes=(INTERVALS,), figures=figures)
 
 
 def _sentence(rows: list[dict[str, Any]], method: str) -> str:

@@ -1,12 +1,13 @@
 """What a table or figure of the paper becomes here: units of work, then rows and sentences."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from html import escape
 
 from policies.experiments.reproduce.plan import Plan
 from policies.experiments.tabular import Rows, html_table, markdown_table
 from policies.experiments.units import Store, Unit
+from teasim.common.figures import Drawing
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,8 @@ class Table:
     """Why nothing was run; empty where something was."""
     notes: Sequence[str] = ()
     """How the numbers are to be read."""
+    figures: Mapping[str, Drawing] = field(default_factory=dict)
+    """Its figures; the name of each is added to that of the exhibit."""
 
     @property
     def columns(self) -> list[str]:
@@ -51,12 +54,20 @@ def as_markdown(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
     return "\n\n".join([*parts, *table.notes]) + "\n"
 
 
-def as_html(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
-    """Write the same section as HTML."""
+def as_html(
+    name: str, exhibit: Exhibit, table: Table, command: str, pictures: Mapping[str, str]
+) -> str:
+    """Write the same section as HTML, with the paths of its figures by what they show."""
     head = f"<section id='{escape(name)}'><h2>{escape(name)}: {escape(exhibit.title)}</h2>"
     parts = [head, f"<pre>{escape(command)}</pre>", f"<p>The paper: {escape(exhibit.paper)}</p>"]
     if table.not_run:
         return "\n".join([*parts, f"<p>Not run: {escape(table.not_run)}</p></section>"])
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in table.words)
     notes = "".join(f"<p>{escape(note)}</p>" for note in table.notes)
-    return "\n".join([*parts, f"<ul>{items}</ul>", html_table(table.rows), notes, "</section>"])
+    drawn = "".join(
+        f'<figure><img src="{escape(path)}" alt="{escape(shows)}">'
+        f"<figcaption>{escape(shows)}</figcaption></figure>"
+        for shows, path in pictures.items()
+    )
+    body = [f"<ul>{items}</ul>", drawn, html_table(table.rows), notes, "</section>"]
+    return "\n".join([*parts, *body])

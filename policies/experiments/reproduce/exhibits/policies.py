@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 from filtering.config import FilterConfig
 from policies.experiments.ablation import run_plan
 from policies.experiments.ablation_config import AblationConfig
+from policies.experiments.ablation_tables import ENDS
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
 from policies.experiments.reproduce.paper import CORRECT
 from policies.experiments.reproduce.plan import (
@@ -24,10 +25,14 @@ from policies.experiments.reproduce.plan import (
 from policies.experiments.units import Result, Store, Unit
 from policies.experiments.variants import FilterVariant, LearnerVariant, PoolVariant
 from policies.play.evaluation import MODES
+from teasim.common.figures import AccuracyFigure
+from teasim.common.figures.accuracy import Point
 from teasim.common.workers import Workers
 
 LEARNERS = ("bc", "bc-rnn", "demodice", "r-maxent")
 """Learners of the figure."""
+DRAWN = ("bc", "bc-rnn")
+"""Learners that are drawn."""
 UNFILTERED, FILTERED = "all", "filtered"
 """Training sets of the figure: all demonstrations, and those that the filter does not flag."""
 OBSERVE = "pixels_agent_pos"
@@ -129,11 +134,37 @@ def table(plan: Plan, store: Store) -> Table:
     words += [_sentence(rows, learner, mode) for learner in LEARNERS for mode in MODES]
     note = (
         f"Ours judges the videos by segments of {SEGMENTERS[PEOPLE_LEVEL]}; policies learn the "
-        "next sub-task from pictures, joint positions and the logged sub-tasks. Differences are to all "
-        "demonstrations, in the same scenes, with 95 % intervals. The oracle leaves out what is "
-        "labelled incorrect."
+        "next sub-task from pictures, joint positions and the logged sub-tasks. Differences are to "
+        "all demonstrations, in the same scenes, with 95 % intervals. The oracle leaves out what "
+        "is labelled incorrect."
     )
-    return Table(rows, words, notes=(note,))
+    figures = {f"{mode} decisions": _figure(rows, mode) for mode in MODES}
+    return Table(rows, words, notes=(note,), figures=figures)
+
+
+def _figure(rows: list[dict[str, Any]], mode: str) -> AccuracyFigure:
+    """Draw the means over the training seeds of the cloned policies, as in the paper."""
+    series: dict[str, tuple[Point, ...]] = {}
+    for learner in DRAWN:
+        for name in (UNFILTERED, FILTERED):
+            mine = [
+                row
+                for row in rows
+                if (row["learner"], row["trained on"], row["decisions"]) == (learner, name, mode)
+            ]
+            numbers = sorted({row["incorrect"] for row in mine})
+            series[f"{learner}, {name}"] = tuple(
+                Point(k, *_means([row for row in mine if row["incorrect"] == k])) for k in numbers
+            )
+    return AccuracyFigure(series)
+
+
+def _means(rows: list[dict[str, Any]]) -> tuple[float, float, float]:
+    """Return the mean policy accuracy of some rows, and the means of the ends of its interval."""
+    value, low, high = (
+        sum(row[f"policy_accuracy{end}"] for row in rows) / len(rows) for end in ENDS
+    )
+    return value, low, high
 
 
 def _sentence(rows: list[dict[str, Any]], learner: str, mode: str) -> str:

@@ -7,6 +7,7 @@ from policies.experiments.reproduce.exhibits.detecting import percent, pools_uni
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
 from policies.experiments.reproduce.plan import PEOPLE_LEVEL, ROBOT_LEVEL, SEGMENTERS, Plan
 from policies.experiments.units import Store, Unit
+from teasim.common.figures import WeightsFigure
 from teasim.common.statistics import Rate, rate
 
 FIGURES: dict[str, tuple[int, tuple[tuple[str, int], ...]]] = {
@@ -28,7 +29,7 @@ def table(plan: Plan, store: Store, name: str) -> Table:
     """Return a row per demonstration of the first pool, and how often the groups are right."""
     _, kinds = FIGURES[name]
     rows: list[dict[str, Any]] = []
-    words = []
+    words, figures = [], {}
     for level, unit in units(plan, name).items():
         pools = store.read(unit)["pools"]
         rows += _rows(SEGMENTERS[level], [kind for kind, _ in kinds], pools[0])
@@ -38,13 +39,26 @@ def table(plan: Plan, store: Store, name: str) -> Table:
                 f"{SEGMENTERS[level]}, {method}, told {len(kinds)} groups: exactly the true groups "
                 f"in {right.hits} of {right.trials} pools ({percent(right)} %)."
             )
+            shows = f"{SEGMENTERS[level]}, {method}"
+            figures[shows] = _figure([kind for kind, _ in kinds], pools[0], method)
     note = "The rows are the first pool; pools share demonstrations of one bank."
-    return Table(rows, words, notes=(note,))
+    return Table(rows, words, notes=(note,), figures=figures)
 
 
 def exactly_right(pools: Sequence[dict[str, Any]], method: str) -> Rate:
     """Return the share of pools whose groups are the kinds of demonstrations."""
     return rate(sum(p["methods"][method]["groups"] == p["kinds"] for p in pools), len(pools))
+
+
+def _figure(kinds: Sequence[str], pool: dict[str, Any], method: str) -> WeightsFigure:
+    """Draw the weights of a pool; marked are those in another group than the best."""
+    said = pool["methods"][method]
+    return WeightsFigure(
+        tuple(said["weights"]),
+        tuple(group > 0 for group in said["groups"]),
+        tuple(kinds[kind] for kind in pool["kinds"]),
+        threshold=0.0,  # there are several groups
+    )
 
 
 def _rows(segmenter: str, kinds: Sequence[str], pool: dict[str, Any]) -> list[dict[str, Any]]:
