@@ -67,8 +67,9 @@ class EvaluationConfig:
     environment: Environment = field(default_factory=EnvironmentConfig)
     """The environment."""
     video: Path | None = None
-    """Folder for videos of what the policy saw in the deterministic episodes: one frame per
-    decision, with the chosen sub-task written below it."""
+    """Folder for videos of the deterministic episodes, from the cameras of the policy, with the
+    chosen sub-task written below the picture. An environment without the method `film` gives one
+    picture per decision."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for less than one episode."""

@@ -51,14 +51,17 @@ def make_environment(
 
 @contextmanager
 def worlds(config: EnvironmentConfig, *, filmed: bool = False) -> Iterator[World]:
-    """Provide environments by observation spec; policies with equal specs share one."""
+    """Provide environments by observation spec; policies with equal specs share one.
+
+    An environment that is filmed simulates everything, also what has been simulated before.
+    """
     with ExitStack() as stack:
         made: dict[ObservationSpec, gym.Env[Any, Any]] = {}
 
         def world(spec: ObservationSpec) -> gym.Env[Any, Any]:
             if spec not in made:
                 env = stack.enter_context(closing(make_environment(config, spec, filmed=filmed)))
-                made[spec] = Remembering(env) if can_remember(env) else env
+                made[spec] = Remembering(env) if can_remember(env) and not filmed else env
             return made[spec]
 
         yield world

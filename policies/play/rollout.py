@@ -11,7 +11,7 @@ import numpy as np
 from policies.data.samples import Observation, Policy
 from policies.play.environments import reported
 from policies.play.outcomes import Played
-from policies.play.video import picture, write_video
+from policies.play.video import EpisodeVideo
 from teasim.common.errors import CheckpointError
 
 
@@ -59,18 +59,18 @@ def run_episode(
     observation, info = env.reset(seed=seed)
     check_fit(policy, observation, info)
     actions: list[Action] = []
-    frames, state = [], None
+    state = None
+    film = None if video is None else EpisodeVideo(video, env, policy)
     start, done = np.ones(1, dtype=np.bool_), False
     while not done:
-        if video is not None:
-            frames.append(picture(env, observation, policy))
         choice, state = policy.predict(observation, state, start, deterministic)
         actions.append(_judge(int(choice), info))
+        if film is not None:
+            film.choose(observation, actions[-1].name)
         observation, _, terminated, truncated, info = env.step(int(choice))
         start, done = np.zeros(1, dtype=np.bool_), terminated or truncated
-    if video is not None:
-        frames.append(picture(env, observation, policy))
-        write_video(video, frames, [action.name for action in actions], bool(info["success"]))
+    if film is not None:
+        film.end(observation, bool(info["success"]))
     return Episode(**reported(env, seed, info), actions=tuple(actions))
 
 

@@ -1,5 +1,6 @@
-"""Videos of an episode: what the policy saw at each decision, with the chosen sub-task below it."""
+"""Videos of an episode, with the chosen sub-task below the picture."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,54 @@ LARGEST = 0.5
 """Largest font scale; a long text below a narrow picture gets a smaller one."""
 WHITE = (255, 255, 255)
 """Colour of the text, RGB."""
+
+
+class EpisodeVideo:
+    """The video of one episode, an mp4 file that is written while it is played.
+
+    An environment that can be filmed (`env.unwrapped.film`) is seen in motion, at the frame rate
+    that its metadata name; of another one there is a picture per decision, one a second.
+    """
+
+    def __init__(self, path: Path, env: gym.Env[Any, Any], policy: Policy) -> None:
+        """Begin to film; the folder of `path` is created."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._path, self._env, self._policy = path, env, policy
+        self._film: Callable[..., None] | None = getattr(env.unwrapped, "film", None)
+        self._fps = int(env.unwrapped.metadata["render_fps"]) if self._film else 1
+        self._text, self._count = "", 0
+        self._writer: VideoWriter | None = None
+        if self._film:
+            self._film(self._take)
+
+    def choose(self, observation: Observation, name: str) -> None:
+        """Go on with sub-task `name`, which was chosen by `observation`."""
+        self._count += 1
+        self._text = f"{self._count} {name}"
+        if not self._film:
+            self._add(picture(self._env, observation, self._policy))
+
+    def end(self, observation: Observation, success: bool) -> None:
+        """Show for a second what was reached, and close the file."""
+        self._text = "goal reached" if success else "goal not reached"
+        last = picture(self._env, observation, self._policy)
+        for _ in range(self._fps):
+            self._add(last)
+        if self._film:
+            self._film(None)
+        if self._writer is not None:
+            self._writer.close()
+
+    def _take(self, seen: Mapping[str, NDArray[np.uint8]]) -> None:
+        cameras = self._policy.spec.cameras or tuple(seen)[:1]
+        self._add(np.hstack([seen[camera] for camera in cameras]))
+
+    def _add(self, frame: NDArray[np.uint8]) -> None:
+        captioned = caption(frame, self._text)
+        if self._writer is None:
+            height, width, _ = captioned.shape
+            self._writer = VideoWriter(self._path, height=height, width=width, fps=self._fps)
+        self._writer.add(captioned)
 
 
 def picture(env: gym.Env[Any, Any], observation: Observation, policy: Policy) -> NDArray[np.uint8]:
@@ -38,25 +87,3 @@ def caption(frame: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
     line = cv2.LINE_AA
     cv2.putText(strip, text, (2, STRIP - 8), cv2.FONT_HERSHEY_SIMPLEX, scale, WHITE, 1, line)
     return np.vstack([frame, strip])
-
-
-def write_video(
-    path: Path, frames: list[NDArray[np.uint8]], chosen: list[str], success: bool
-) -> None:
-    """Write `frames` (H, W, 3), one per decision and the last one, at one frame per second.
-
-    Args:
-        path: mp4 file; its folder is created.
-        frames: pictures before each decision and after the last.
-        chosen: sub-task chosen at each decision, one fewer than `frames`.
-        success: whether the goal was reached, for the last caption.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    captions = [f"{number} {name}" for number, name in enumerate(chosen, start=1)]
-    captions.append("goal reached" if success else "goal not reached")
-    captioned = [caption(frame, text) for frame, text in zip(frames, captions, strict=True)]
-    height, width, _ = captioned[0].shape
-    video = VideoWriter(path, height=height, width=width, fps=1)
-    for frame in captioned:
-        video.add(frame)
-    video.close()

@@ -1,6 +1,7 @@
 """A policy whose every choice is known gets exactly the scores that follow from them."""
 
 from contextlib import closing
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -121,6 +122,40 @@ def test_the_video_has_one_frame_per_decision_and_the_last(tmp_path):
     assert np.ptp(pictures[0].mean(axis=(1, 2))) < 3
     assert np.ptp(pictures[-1].mean(axis=(1, 2))) > 10
     assert (strips.max(axis=(1, 2, 3)) > 150).all()  # every strip holds a text
+
+
+class Moving(gym.Wrapper):
+    """A world that shows four pictures of every decision."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.metadata = {**env.metadata, "render_fps": 10}
+        self.take = None
+
+    @property
+    def unwrapped(self):
+        return self
+
+    def film(self, take):
+        self.take = take
+
+    def step(self, action):
+        for shade in range(4):
+            self.take({"left": np.full((64, 64, 3), 50 * shade, np.uint8)})
+        return self.env.step(action)
+
+
+def test_a_world_that_can_be_filmed_is_seen_in_motion(tmp_path):
+    policy = ScriptedPolicy()
+    policy.spec = replace(policy.spec, cameras=("left",))
+    with make_environment(FAKE_WORLD, policy.spec) as env:
+        moving = Moving(env)
+        run_episode(moving, policy, 0, deterministic=True, video=tmp_path / "seen.mp4")
+        assert moving.take is None  # nothing is filmed after the end
+    clip = VideoClip.whole(tmp_path / "seen.mp4")
+    assert check_decodable(clip.path) == 7 * 4 + 10
+    shades = clip.frames(range(8))[:, :64].mean(axis=(1, 2, 3))
+    np.testing.assert_allclose(shades, [0, 50, 100, 150] * 2, atol=6)
 
 
 def test_a_policy_without_cameras_can_be_filmed_and_sees_no_picture(tmp_path):
