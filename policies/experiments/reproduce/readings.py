@@ -15,9 +15,11 @@ from filtering.judging.evidence import Evidence
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
+from filtering.vision.frames import frame_rate
 from teasim.common.arrays import Array
 from teasim.common.workers import IN_PROCESS
 from teasim.pool import Pool
+from teasim.pool.source import Source
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Reading:
         )
 
 
-def read(pool: Pool, segmenter: str, frames: int) -> Reading:
+def read(pool: Source, segmenter: str, frames: int) -> Reading:
     """Segment all demonstrations of `pool` from its videos.
 
     Args:
@@ -54,7 +56,7 @@ def read(pool: Pool, segmenter: str, frames: int) -> Reading:
     """
     found = segmenter_named(segmenter)(pool, workers=IN_PROCESS)
     source = FrameSource(pool.cameras)
-    rests = look_at_rests(pool.episodes, found.spans, pool.fps, source, workers=IN_PROCESS)
+    rests = look_at_rests(pool.episodes, found.spans, frame_rate(pool), source, workers=IN_PROCESS)
     features = segment_features(
         pool,
         found.spans,

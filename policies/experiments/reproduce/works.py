@@ -35,6 +35,8 @@ from policies.experiments.units import Result, Store, Unit, Work
 from teasim.common.errors import ConfigError
 from teasim.common.workers import Workers
 from teasim.pool import Pool
+from teasim.pool.source import Source
+from teasim.pool.views.part import Part
 
 
 def film(unit: Unit, store: Store, workers: Workers) -> Result:
@@ -99,12 +101,12 @@ def judge_pools(
         reading, own = _reading(unit, store, pool, places)
         kinds = np.repeat(range(len(spec["kinds"])), [count for _, count in spec["kinds"]])
         names = tuple(pool.episodes[place].demo_id for place in places)
-        ours = judge_videos(pool.only(places), _segmenter(unit, store)) if spec["ours"] else None
+        ours = judge_videos(_part(pool, places), _segmenter(unit, store)) if spec["ours"] else None
         judged.append(judge(Question(reading.evidence(own), kinds, names, number, ours)))
     return {"pools": judged}
 
 
-def judge_videos(pool: Pool, segmenter: str) -> Answer:
+def judge_videos(pool: Source, segmenter: str) -> Answer:
     """Judge a pool as `teasim filter` does, with a segmenter of its own."""
     found = DemoFilter(FilterConfig(segmenter=segmenter)).fit(pool)
     return Answer(found.flagged_, found.losses_, found.probabilities_)
@@ -124,7 +126,12 @@ def _reading(
     if "network" in unit.needs:
         network = store.folder_of(unit.needs["network"])
         return read_bank(Path(pool.root).resolve(), network.resolve(), frames), places
-    return read(pool.only(places), unit.spec["segmenter"], frames), range(len(places))
+    return read(_part(pool, places), unit.spec["segmenter"], frames), range(len(places))
+
+
+def _part(pool: Pool, places: Sequence[int]) -> Part:
+    """Return a pool of some demonstrations of a bank, which is sound: it was made here."""
+    return Part(pool, [pool.episodes[place] for place in places])
 
 
 def drawn(
