@@ -309,12 +309,14 @@ from the whole video.
         self, pool: Source, seen: "Comparable", groups: str = "auto"
     ) -> "tuple[Judgement, MomentScore]":
         # Imported here because step lists need neither torch nor videos.
-        from filtering.judging.moments import Timeline, judge_moments
+        from filtering.judging.moments import Timeline, judge_moments, told_of_looks
 
         episodes = pool.episodes
         timeline = Timeline([e.length for e in episodes], [e.name for e in episodes], pool.fps)
         with self._timed("moments"):
-            return judge_moments(seen, timeline, groups)
+            judgement, score = judge_moments(seen, timeline, groups)
+        self._notes += told_of_looks(score.looks, timeline.names)
+        return judgement, score
 
     def _cut(self, judgement: Judgement) -> Judgement:
         """Apply a threshold that was asked for."""

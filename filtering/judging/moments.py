@@ -1,6 +1,6 @@
 """Judge a pool by moments of its videos: the score `moments` in the form of every other score."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from filtering.judging.explain import Clock, Counterpart, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.thresholds import Grouping, as_many_as_asked
+from filtering.moments.evidence.peers import Looks
 from filtering.moments.evidence.stretches import Stretch
 from filtering.moments.score import MomentFinding, MomentScore, score_comparable
 from filtering.moments.suitable import Comparable
@@ -22,6 +23,8 @@ NATURES = {
     "extra": "extra steps",
 }
 """Group of a demonstration by the gravest kind of evidence against it."""
+MOST_NAMED = 8
+"""Most demonstrations that a sentence names."""
 GROUPS = ("kept", "out of order", "steps left out", "extra steps")
 """Groups, the best first."""
 
@@ -84,6 +87,27 @@ def judge_moments(
         probabilities=score.probabilities,
     )
     return judged, score
+
+
+def told_of_looks(looks: Mapping[str, Looks], names: Sequence[str]) -> tuple[str, ...]:
+    """Return a sentence per look that is not the commonest one of its camera.
+
+    Args:
+        looks: per camera (D,) the same number for demonstrations that look alike.
+        names: (D,) what a person calls the demonstrations.
+    """
+    told = []
+    for camera, of in looks.items():
+        numbers, counts = np.unique(of, return_counts=True)
+        for number in numbers[np.argsort(-counts, kind="stable")][1:]:
+            members = [name for name, own in zip(names, of, strict=True) if own == number]
+            more = f" and {len(members) - MOST_NAMED} more" if len(members) > MOST_NAMED else ""
+            told.append(
+                f"Camera {camera} sees {len(members)} of {len(names)} in another way at all times "
+                f"({', '.join(members[:MOST_NAMED])}{more}): what is usual among them is no "
+                "evidence."
+            )
+    return tuple(told)
 
 
 def reason(finding: MomentFinding, counts: Sequence[int], timeline: Timeline) -> str:

@@ -22,7 +22,7 @@ from filtering.moments.decision import (
 from filtering.moments.evidence.effects import View, ineffective, observe
 from filtering.moments.evidence.kinds import missing_order_extra
 from filtering.moments.evidence.orders import kept_orders, moves_between, variety_of
-from filtering.moments.evidence.peers import Flags, Peers, looks_of
+from filtering.moments.evidence.peers import Flags, Looks, Peers, looks_of
 from filtering.moments.evidence.strange import Strange, strange_in
 from filtering.moments.evidence.stretches import Evidence, Stretch
 from filtering.moments.evidence.usual import Reference, references_of
@@ -79,6 +79,8 @@ class MomentScore:
     """Per camera how much the videos have in common, see `suitable.shared_structure`."""
     kept: Array
     """(D,) share of the others whose order a demonstration keeps, as most cameras see it."""
+    looks: Mapping[str, Looks]
+    """Per camera (D,) the same number for demonstrations that look alike."""
 
     @property
     def one_order(self) -> float:
@@ -210,6 +212,7 @@ def _judged(
         found,
         structure,
         kept=np.median(kept, axis=0),
+        looks=looks,
     )
 
 

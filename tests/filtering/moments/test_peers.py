@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from filtering.judging.moments import told_of_looks
 from filtering.moments.counterparts import compare
 from filtering.moments.evidence.peers import Peers, looks_of
 from filtering.moments.score import score_moments
@@ -63,6 +64,18 @@ def test_peers_are_the_trusted_of_the_same_look_if_there_are_enough():
 def test_a_few_correct_videos_of_another_hand_are_not_accused():
     hands = [1, 1, 1, 1, *[0] * 8]
     assert not score_moments({"front": pool(hands)}).flagged.any()
+
+
+def test_a_look_is_told_with_names():
+    told = told_of_looks({"front": np.array([0, 1, 1, 0, 0])}, ["a", "b", "c", "d", "e"])
+    assert told == (
+        "Camera front sees 2 of 5 in another way at all times (b, c): what is usual among them is "
+        "no evidence.",
+    )
+    many = told_of_looks({"top": np.array([0] * 10 + [1] * 9)}, [f"video {n}" for n in range(19)])
+    assert "(video 10, " in many[0]
+    assert "video 17 and 1 more)" in many[0]
+    assert told_of_looks({"front": np.zeros(3, int)}, ["a", "b", "c"]) == ()
 
 
 def test_a_mistake_is_found_among_videos_of_its_own_hand():
