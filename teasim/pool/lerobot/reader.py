@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from copy import copy
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -35,6 +36,16 @@ class Pool:
             PoolError: There is no pool at `path`, it is empty, or its metadata are damaged.
         """
         return cls(read_metadata(located(path)))
+
+    def only(self, places: Sequence[int]) -> Self:
+        """Return a pool of the demonstrations at some places of this one; no file is copied.
+
+        It is a pool, which policies can learn from; a part of any source is a `views.part.Part`.
+        """
+        part = copy(self)
+        vars(part).pop("_findings", None)  # they are about all demonstrations
+        part.episodes = tuple(self.episodes[place] for place in places)
+        return part
 
     def __repr__(self) -> str:
         """Folder and size."""
