@@ -10,6 +10,7 @@ also get noise.
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -30,6 +31,8 @@ LIGHT = 0.15
 """Largest relative change of brightness."""
 NOISE = 4.0
 """Largest standard deviation of added pixel noise [grey levels]."""
+REMEMBERED = 1024
+"""Pictures whose maps are remembered: policies that are compared see the same ones."""
 
 
 def views(frames: NDArray[np.uint8], copies: int, random: np.random.Generator) -> NDArray[np.uint8]:
@@ -52,6 +55,19 @@ def camera_maps(pixels: Mapping[str, NDArray[np.uint8]], cameras: tuple[str, ...
     """
     with one_thread(), torch.inference_mode():
         return np.stack([_maps(pixels[camera]) for camera in cameras], axis=1)
+
+
+def picture_maps(pixels: Mapping[str, NDArray[np.uint8]], cameras: tuple[str, ...]) -> Maps:
+    """Return the feature maps (1, K, C, H / 16, W / 16) of one picture (H, W, 3) per camera."""
+    return np.stack(
+        [_remembered(pixels[camera].tobytes(), pixels[camera].shape) for camera in cameras], axis=1
+    )
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _remembered(picture: bytes, shape: tuple[int, ...]) -> Maps:
+    frame = np.frombuffer(picture, dtype=np.uint8).reshape(shape)
+    return camera_maps({"": frame[None]}, ("",))[:, 0]
 
 
 def _alter(frame: NDArray[np.uint8], random: np.random.Generator) -> NDArray[np.uint8]:

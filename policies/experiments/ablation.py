@@ -25,7 +25,7 @@ from policies.experiments.ablation_tables import (
     ablation_figures,
     write_results,
 )
-from policies.experiments.choosing import Chooser
+from policies.experiments.choosing import Chooser, labels_of
 from policies.experiments.generating import generate_pool
 from policies.experiments.playing import AnyScores, play_cell, scores_from_json, scores_json
 from policies.experiments.units import versions
@@ -51,6 +51,8 @@ class Run:
 
     cell: Cell
     """The cell."""
+    same: tuple[Cell, ...]
+    """Cells whose filters left the same training set, so that their scores are the same."""
     learner: LearnerVariant
     """The learner and its settings."""
     samples: Any
@@ -111,10 +113,25 @@ def results_of(config: AblationConfig, choosers: Sequence[Chooser], out: Path) -
 
 
 def open_pool(variant: PoolVariant, out: Path, workers: Workers) -> Pool:
-    """Open a pool, or make it in the output folder of the ablation."""
+    """Open a pool, or make it in the output folder of the ablation; keep the part asked for.
+
+    Raises:
+        ConfigError: it has fewer incorrect demonstrations than asked for, or no labels.
+    """
     if variant.folder is not None:
-        return Pool.open(variant.folder)
-    return generate_pool(out / "pools" / variant.name, variant.options, workers)
+        pool = Pool.open(variant.folder)
+    else:
+        pool = generate_pool(out / "pools" / variant.name, variant.options, workers)
+    if variant.incorrect is None:
+        return pool
+    wrong = labels_of(pool)
+    if wrong.sum() < variant.incorrect:
+        raise ConfigError(
+            f"'{pool.root}' has {wrong.sum()} demonstrations labelled incorrect, fewer than "
+            f"'incorrect' of the pool '{variant.name}', {variant.incorrect}."
+        )
+    kept = ~wrong | (np.cumsum(wrong) <= variant.incorrect)
+    return pool.only(np.flatnonzero(kept).tolist())
 
 
 def chooser_of(
@@ -183,15 +200,20 @@ def _runs(config: AblationConfig, chooser: Chooser) -> list[Run]:
         level: LEVELS[level].load(chooser.pool, demos, workers=chooser.workers) for level in wanted
     }
     experts = _experts(config, chooser)
+    alike: dict[tuple[str, int, bytes], list[Cell]] = {}
+    for cell in cells:
+        key = (cell.learner, cell.seed, weights[cell.filter].tobytes())
+        alike.setdefault(key, []).append(cell)
     return [
         Run(
             cell,
+            tuple(others),
             learners[cell.learner],
             samples[learners[cell.learner].level],
             weights[cell.filter],
             experts,
         )
-        for cell in cells
+        for cell, *others in alike.values()
     ]
 
 
@@ -215,14 +237,13 @@ def _run_all(runs: Sequence[Run], *, config: AblationConfig, out: Path) -> None:
 
 
 def _run_cell(run: Run, world: World, config: AblationConfig, out: Path) -> None:
-    """Train one policy, evaluate it, and write its scores."""
+    """Train one policy, evaluate it, and write its scores, also for the cells that are the same."""
     cell, kind = run.cell, run.learner.kind
     needed: dict[str, Any] = {"experts": run.experts} if EXPERTS in kind.needs else {}
     learner = kind.make(seed=cell.seed, **run.learner.settings, **needed)
     policy = learner.fit(run.samples, run.weights).policy_
     played = play_cell(policy, run.learner.level, config, world)
     record = {
-        **asdict(cell),
         "level": run.learner.level,
         "settings": asdict(learner.config),
         "actions": policy.action_names,
@@ -230,7 +251,8 @@ def _run_cell(run: Run, world: World, config: AblationConfig, out: Path) -> None
         "versions": versions(),
         "scores": scores_json(played),
     }
-    write_json(cell.path(out), record)
+    for one in (cell, *run.same):
+        write_json(one.path(out), asdict(one) | record)
 
 
 def _read(path: Path) -> dict[str, AnyScores]:

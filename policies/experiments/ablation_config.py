@@ -29,7 +29,8 @@
     use = "discard"
     table = "tables/{pool}.csv"
 
-`pools` can also be tables, [pools.NAME] each, with `folder` or with options of `teasim generate`.
+`pools` can also be tables, [pools.NAME] each, with `folder` or with options of `teasim generate`,
+and with `incorrect`, the number of demonstrations labelled incorrect that belong to it.
 
 The other filters are compared with the first one.
 """
@@ -101,6 +102,13 @@ class AblationConfig:
             raise ConfigError(
                 f"The learner '{needy[0]}' needs demonstrations known to be good; set 'expert' "
                 "(their episodes) or 'experts' (how many of those labelled correct)."
+            )
+        parts = [pool.name for pool in self.pools if pool.incorrect is not None]
+        theirs = [variant.name for variant in self.filters if variant.command]
+        if parts and theirs:
+            raise ConfigError(
+                f"The pool '{parts[0]}' is a part of a folder ('incorrect'), which the command of "
+                f"the filter '{theirs[0]}' cannot be told; leave out one of them."
             )
         if self.expert and self.experts:
             raise ConfigError("Both 'expert' and 'experts' were given; choose one.")

@@ -8,14 +8,29 @@ from typing import Any
 
 from policies.experiments.ablation_config import AblationConfig
 from policies.experiments.detection import DetectionScores, Judged, detection_scores
-from policies.experiments.playing import AnyScores, hits_by_scene, main_rate, merged
+from policies.experiments.playing import (
+    AnyScores,
+    hits_by_policy,
+    hits_by_scene,
+    main_rate,
+    merged,
+)
 from policies.experiments.tabular import html_page, html_table, markdown_table, write_rows
 from policies.play.evaluation import MODES, Scores
 from teasim.common.figures import AccuracyFigure, Drawing
 from teasim.common.figures.accuracy import Point
 from teasim.common.files import write_text
-from teasim.common.statistics import Rate, bootstrap_difference, rate
+from teasim.common.statistics import (
+    Difference,
+    Rate,
+    bootstrap_difference,
+    grouped_rate,
+    rate,
+    widest,
+)
 
+GROUPINGS = (hits_by_scene, hits_by_policy)
+"""Trials that may be correlated; an interval is the wider one."""
 ENDS = ("", "_low", "_high")
 """Ends of the names of the three columns of a rate."""
 
@@ -57,6 +72,11 @@ class Found:
     def kinds(self) -> list[str]:
         """Kinds of violation, in the environments' words."""
         return list(dict.fromkeys(kind for s in self._scores() for kind in s.violations))
+
+    @property
+    def incorrect(self) -> dict[str, int]:
+        """Number K of demonstrations labelled incorrect, by pool; only of pools with labels."""
+        return {pool: sum(judged.wrong) for (pool, _), judged in self.detection.items()}
 
     @property
     def measure(self) -> str:
@@ -142,7 +162,7 @@ def detection_rows(found: Found) -> list[dict[str, Any]]:
 
 def tables_of(config: AblationConfig, found: Found) -> dict[str, list[dict[str, Any]]]:
     """Return the tables to read, by title."""
-    tables = {
+    tables = by_number(config, found) | {
         f"{mode} decisions, {config.episodes} episodes per policy": _table(config, found, mode)
         for mode in MODES
     }
@@ -159,6 +179,64 @@ def tables_of(config: AblationConfig, found: Found) -> dict[str, list[dict[str, 
         for s in [detection_scores([judged])]
     ]
     return tables | {"detection": rows} if rows else tables
+
+
+def by_number(config: AblationConfig, found: Found) -> dict[str, list[dict[str, Any]]]:
+    """Return a table per mode over the number K of incorrect demonstrations, pools pooled.
+
+    None where no two pools have the same K. Intervals are the wider one of two: with each scene,
+    and with each policy, as a group of correlated trials.
+    """
+    incorrect = found.incorrect
+    if len(incorrect) == len(set(incorrect.values())):
+        return {}
+    return {
+        f"{mode} decisions, by incorrect demonstrations": [
+            {
+                "incorrect": k,
+                "pools": list(incorrect.values()).count(k),
+                "filter": variant.name,
+                "learner": learner.name,
+                **_pooled(config, found, (variant.name, learner.name, mode), k),
+            }
+            for k in sorted(set(incorrect.values()))
+            for learner in config.learners
+            for variant in config.filters
+        ]
+        for mode in MODES
+    }
+
+
+def _pooled(
+    config: AblationConfig, found: Found, key: tuple[str, str, str], k: int
+) -> dict[str, Any]:
+    """Return what a row says about a filter, learner and mode over all pools of K and seeds."""
+    base = config.filters[0].name
+    mine = _scores(config, found, key, k)
+    theirs = _scores(config, found, (base, *key[1:]), k)
+    sizes = [
+        sum(judged.flagged)
+        for (pool, name), judged in found.detection.items()
+        if name == key[0] and found.incorrect[pool] == k
+    ]
+    return {
+        "left out": ", ".join(map(str, sizes)),
+        found.measure: str(_wide_rate(mine)),
+        "goal reached": str(merged(mine).success),
+        f"{found.measure} against '{base}'": None if key[0] == base else str(_gap(mine, theirs)),
+    }
+
+
+def _wide_rate(scores: list[AnyScores]) -> Rate:
+    """Return the rate of several policies; a single one says nothing of how policies differ."""
+    groupings = GROUPINGS if len(scores) > 1 else GROUPINGS[:1]
+    return widest([grouped_rate(by(scores)) for by in groupings])
+
+
+def _gap(mine: list[AnyScores], theirs: list[AnyScores]) -> Difference:
+    """Return the difference of the same policies' scores, with the wider interval."""
+    gaps = [bootstrap_difference(by(mine), by(theirs)) for by in GROUPINGS]
+    return Difference(gaps[0].value, min(g.low for g in gaps), max(g.high for g in gaps))
 
 
 def _table(config: AblationConfig, found: Found, mode: str) -> list[dict[str, Any]]:
@@ -225,14 +303,14 @@ def ablation_figures(config: AblationConfig, found: Found) -> dict[str, Drawing]
 
     Pools with the same K and training seeds are pooled.
     """
-    incorrect = {pool: sum(judged.wrong) for (pool, _), judged in found.detection.items()}
+    incorrect = found.incorrect
     if not incorrect:
         return {}
     return {
         f"accuracy_{mode}": AccuracyFigure(
             {
                 _name(config, variant.name, learner.name): tuple(
-                    _point(config, found, (variant.name, learner.name, mode), k, incorrect)
+                    _point(config, found, (variant.name, learner.name, mode), k)
                     for k in sorted(set(incorrect.values()))
                 )
                 for variant in config.filters
@@ -248,19 +326,20 @@ def _name(config: AblationConfig, variant: str, learner: str) -> str:
     return variant if len(config.learners) == 1 else f"{learner}, {variant}"
 
 
-def _point(
-    config: AblationConfig,
-    found: Found,
-    key: tuple[str, str, str],
-    k: int,
-    incorrect: dict[str, int],
-) -> Point:
+def _point(config: AblationConfig, found: Found, key: tuple[str, str, str], k: int) -> Point:
+    scores = _scores(config, found, key, k)
+    share = _wide_rate(scores)
+    return Point(k, share.value, share.low, share.high)
+
+
+def _scores(
+    config: AblationConfig, found: Found, key: tuple[str, str, str], k: int
+) -> list[AnyScores]:
+    """Return the scores of a filter, learner and mode, a policy per pool of K and seed."""
     variant, learner, mode = key
-    scores = [
+    return [
         found.cells[Cell(pool, variant, learner, seed)][mode]
-        for pool, number in incorrect.items()
+        for pool, number in found.incorrect.items()
         if number == k
         for seed in config.seeds
     ]
-    rate = main_rate(merged(scores))
-    return Point(k, rate.value, rate.low, rate.high)

@@ -92,13 +92,22 @@ class Chooser:
         Raises:
             ConfigError: the pool does not say.
         """
-        labels = incorrect(self.pool)
-        if labels is None:
-            raise ConfigError(
-                f"'{self.pool.root}' does not say which demonstrations are correct; "
-                "leave out the filter with use 'labels'."
-            )
-        return labels
+        return labels_of(self.pool)
+
+
+def labels_of(pool: Pool) -> NDArray[np.bool_]:
+    """Return which demonstrations of a pool are labelled incorrect, (D,).
+
+    Raises:
+        ConfigError: the pool does not say.
+    """
+    labels = incorrect(pool)
+    if labels is None:
+        raise ConfigError(
+            f"'{pool.root}' does not say which demonstrations are correct; "
+            "leave out what needs labels, such as a filter with use 'labels'."
+        )
+    return labels
 
 
 def incorrect(pool: Pool) -> NDArray[np.bool_] | None:

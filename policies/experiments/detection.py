@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from teasim.common.statistics import Rate, auroc, grouped_rate
+from teasim.common.statistics import Rate, auroc, grouped_rate, widest
 
 
 @dataclass(frozen=True)
@@ -126,10 +126,9 @@ def _rate(pools: Sequence[Judged], trial: Trial) -> Rate:
                 for group in (by_pool.setdefault(number, [0, 0]), by_demo.setdefault(name, [0, 0])):
                     group[0] += hit
                     group[1] += 1
-    rates = [
-        grouped_rate([(hits, trials) for hits, trials in groups.values()])
-        for groups in (by_pool, by_demo)
-    ]
-    first = rates[0]
-    low, high = min(r.low for r in rates), max(r.high for r in rates)
-    return Rate(first.hits, first.trials, low, high)
+    return widest(
+        [
+            grouped_rate([(hits, trials) for hits, trials in groups.values()])
+            for groups in (by_pool, by_demo)
+        ]
+    )

@@ -79,6 +79,14 @@ def hits_by_scene(found: list[AnyScores]) -> list[tuple[int, int]]:
     ]
 
 
+def hits_by_policy(found: list[AnyScores]) -> list[tuple[int, int]]:
+    """Return the hits and trials of `main_rate` per policy, over the scenes."""
+    return [
+        (sum(hits for hits, _ in scenes), sum(trials for _, trials in scenes))
+        for scenes in map(_hits, found)
+    ]
+
+
 def _hits(scores: AnyScores) -> list[tuple[int, int]]:
     if isinstance(scores, Scores):
         return [(episode.n_correct, len(episode.actions)) for episode in scores.episodes]

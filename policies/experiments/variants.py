@@ -36,10 +36,16 @@ class PoolVariant:
     """Where it is; None: it is made."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Options of `teasim generate`."""
+    incorrect: int | None = None
+    """How many of its demonstrations labelled incorrect belong to it, the first ones; None: all."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a name that is not one of files, or a folder with options."""
         check_file_name("pool", self.name)
+        if self.incorrect is not None and (type(self.incorrect) is not int or self.incorrect < 0):
+            raise ConfigError(
+                f"'incorrect' of the pool '{self.name}' must be a whole number, 0 or more."
+            )
         if self.folder is not None and self.options:
             raise ConfigError(
                 f"The pool '{self.name}' has a folder, so it takes no options of generate; leave "
@@ -120,8 +126,9 @@ class LearnerVariant:
 def read_pools(given: Any, home: Path) -> tuple[PoolVariant, ...]:
     """Read a list of folders relative to `home`, or the tables [pools.NAME] of a configuration.
 
-    The key `folder` of a table is where a pool is; all other keys are options of `teasim generate`,
-    by which the pool is made.
+    The key `folder` of a table is where a pool is, and `incorrect` how many of its demonstrations
+    that are labelled incorrect belong to it; all other keys are options of `teasim generate`, by
+    which the pool is made.
 
     Raises:
         ConfigError: it is neither.
@@ -134,7 +141,8 @@ def read_pools(given: Any, home: Path) -> tuple[PoolVariant, ...]:
         PoolVariant(
             name,
             home / str(table["folder"]) if "folder" in table else None,
-            _without(table, "folder"),
+            _without(table, "folder", "incorrect"),
+            table.get("incorrect"),
         )
         for name, table in given.items()
     )

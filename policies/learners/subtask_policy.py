@@ -5,7 +5,7 @@ import torch
 from numpy.typing import NDArray
 
 from filtering.vision.determinism import one_thread
-from policies.data.features import NO_MAPS, Maps, camera_maps
+from policies.data.features import NO_MAPS, Maps, camera_maps, picture_maps
 from policies.data.samples import (
     STATE_KEYS,
     Observation,
@@ -79,9 +79,7 @@ def _look(
         return np.empty((len(low_dim), *NO_MAPS), np.float16), low_dim, numbers.ndim == 1
     pixels = pictures(observation, spec.cameras)
     single = next(iter(pixels.values())).ndim == 3
-    if single:
-        pixels = {camera: frames[None] for camera, frames in pixels.items()}
-    maps = camera_maps(pixels, spec.cameras)
+    maps = (picture_maps if single else camera_maps)(pixels, spec.cameras)
     low_dim = np.empty((len(maps), 0), dtype=np.float32)
     if spec.state_names:
         low_dim = np.asarray(observation["agent_pos"]).reshape(len(maps), -1)

@@ -90,6 +90,12 @@ def grouped_rate(groups: Sequence[tuple[int, int]]) -> Rate:
     return Rate(hits, trials, *wilson_interval(at, effective))
 
 
+def widest(rates: Sequence[Rate]) -> Rate:
+    """Return the same rate with an interval that covers those of all `rates`."""
+    first = rates[0]
+    return Rate(first.hits, first.trials, min(r.low for r in rates), max(r.high for r in rates))
+
+
 def _design_effect(groups: Sequence[tuple[int, int]], hits: int, trials: int) -> float:
     count = sum(1 for _, n in groups if n)
     if trials == 0:

@@ -335,6 +335,66 @@ def test_the_tables_are_the_same_in_every_form(many):
     assert (many / "results.html").read_text().count("<table>") == 3
 
 
+PARTS = """
+[pools.one]
+folder = "pool"
+incorrect = 1
+[pools.two]
+folder = "pool"
+incorrect = 2
+[pools.other]
+folder = "pool"
+incorrect = 2
+"""
+
+
+def test_pools_can_be_parts_and_are_put_together_by_their_incorrect_demonstrations(
+    folder, tmp_path, monkeypatch
+):
+    (folder / "parts.toml").write_text(SETTINGS + FILTERS + PARTS)
+    trained = []
+    real = ablation._run_cell
+    monkeypatch.setattr(
+        ablation, "_run_cell", lambda run, *rest: trained.append(run) or real(run, *rest)
+    )
+    assert ablate([str(folder / "parts.toml"), "-o", str(tmp_path), "--jobs", "1"]) == 0
+    rows = {(row["pool"], row["filter"]): row for row in rows_of(tmp_path / "detection.csv")}
+    assert [rows[pool, "labels"]["incorrect"] for pool in ("one", "two", "other")] == list("122")
+    assert len(list((tmp_path / "cells").iterdir())) == 3 * 3 * 2 * 2
+    assert len(trained) == 3 * 2 * 2 * 2  # norm and labels leave the same
+    table = (tmp_path / "results.md").read_text()
+    assert "## sampled decisions, by incorrect demonstrations" in table
+    assert "\n| 1 | 1 | norm | bc | 1 | " in table
+    line = next(x for x in table.splitlines() if x.startswith("| 2 | 2 | labels | bc | 2, 2 | "))
+    assert " points (" in line
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (
+            'folder = "pool"\nincorrect = 3',
+            "'{pool}' has 2 demonstrations labelled incorrect, fewer than 'incorrect' of the pool "
+            "'part', 3.",
+        ),
+        (
+            'folder = "pool"\nincorrect = -1',
+            "'incorrect' of the pool 'part' must be a whole number, 0 or more.",
+        ),
+        (
+            'folder = "pool"\nincorrect = 1\n[filters.b]\ncommand = "c {table}"',
+            "The pool 'part' is a part of a folder ('incorrect'), which the command of the filter "
+            "'b' cannot be told; leave out one of them.",
+        ),
+    ],
+)
+def test_a_part_that_cannot_be_had_is_refused(folder, tmp_path, table, said):
+    plan = folder / "part.toml"
+    plan.write_text(SETTINGS + FILTERS + "[pools.part]\n" + table)
+    found = refused(lambda: ablate([str(plan), "-o", str(tmp_path / "out"), "--jobs", "1"]))
+    assert found == said.replace("{pool}", str(folder / "pool"))
+
+
 @pytest.mark.parametrize(
     ("tool", "said"),
     [
