@@ -67,8 +67,8 @@ class EvaluationConfig:
     environment: Environment = field(default_factory=EnvironmentConfig)
     """The environment."""
     video: Path | None = None
-    """Folder for videos of what the policy saw in the deterministic episodes: one frame per
-    decision, with the chosen sub-task written below it."""
+    """Folder for videos of the deterministic episodes: the motion of every sub-task, its name
+    written below it; one picture per decision where an environment shows no motion."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for less than one episode."""

@@ -1,7 +1,7 @@
-"""Videos of an episode: what the policy saw at each decision, with the chosen sub-task below it."""
+"""Videos of an episode: the motion of every sub-task, with its name below it."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import gymnasium as gym
@@ -11,12 +11,21 @@ from numpy.typing import NDArray
 from policies.data.samples import Observation, Policy, pictures
 from teasim.pool.clips import VideoWriter
 
+FILM = "rgb_array_list"
+"""Render mode of environments that take pictures in the middle of an action."""
 STRIP = 24
 """Height of the strip below the picture [pixel]; even, as the video codec needs it."""
 LARGEST = 0.5
 """Largest font scale; a long text below a narrow picture gets a smaller one."""
 WHITE = (255, 255, 255)
 """Colour of the text, RGB."""
+ENDING = 2.0
+"""Time for which the last picture is shown, with whether the goal was reached [s]."""
+
+
+def moves(env: gym.Env[Any, Any]) -> bool:
+    """Tell whether `env` takes pictures in the middle of an action."""
+    return env.render_mode == FILM and FILM in env.unwrapped.metadata["render_modes"]
 
 
 def picture(env: gym.Env[Any, Any], observation: Observation, policy: Policy) -> NDArray[np.uint8]:
@@ -40,23 +49,62 @@ def caption(frame: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
     return np.vstack([frame, strip])
 
 
-def write_video(
-    path: Path, frames: list[NDArray[np.uint8]], chosen: list[str], success: bool
-) -> None:
-    """Write `frames` (H, W, 3), one per decision and the last one, at one frame per second.
+class Film:
+    """The video of one episode, written while it is played.
 
-    Args:
-        path: mp4 file; its folder is created.
-        frames: pictures before each decision and after the last.
-        chosen: sub-task chosen at each decision, one fewer than `frames`.
-        success: whether the goal was reached, for the last caption.
+    Where the environment shows no motion there is one picture per decision, a second each.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    captions = [f"{number} {name}" for number, name in enumerate(chosen, start=1)]
-    captions.append("goal reached" if success else "goal not reached")
-    captioned = [caption(frame, text) for frame, text in zip(frames, captions, strict=True)]
-    height, width, _ = captioned[0].shape
-    video = VideoWriter(path, height=height, width=width, fps=1)
-    for frame in captioned:
-        video.add(frame)
-    video.close()
+
+    def __init__(self, path: Path, env: gym.Env[Any, Any], policy: Policy) -> None:
+        """Film `policy` in `env`; `path` is an mp4 file, whose folder is made."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._path, self._env, self._policy = path, env, policy
+        self._moves = moves(env)
+        self._fps = float(env.unwrapped.metadata["render_fps"]) if self._moves else 1.0
+        self._video: VideoWriter | None = None
+        self._last: NDArray[np.uint8] | None = None
+        self._decisions = 0
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        """Finish the file, or leave it if the episode failed."""
+        if self._video is not None:
+            self._video.abort() if kind else self._video.close()
+
+    def before(self, observation: Observation, name: str) -> None:
+        """Show what there is before sub-task `name`, which is written below it and its motion."""
+        self._decisions += 1
+        self._text = f"{self._decisions} {name}"
+        if self._moves:
+            self._add(self._taken())  # the start of the episode
+        else:
+            self._add([picture(self._env, observation, self._policy)])
+
+    def after(self) -> None:
+        """Show the motion of the sub-task."""
+        if self._moves:
+            self._add(self._taken())
+
+    def end(self, observation: Observation, success: bool) -> None:
+        """Show how it ended."""
+        self._text = "goal reached" if success else "goal not reached"
+        if not self._moves:
+            self._add([picture(self._env, observation, self._policy)])
+        elif self._last is not None:
+            self._add([self._last] * round(ENDING * self._fps))
+
+    def _taken(self) -> list[NDArray[np.uint8]]:
+        frames: Any = self._env.render()
+        return list(frames)
+
+    def _add(self, frames: list[NDArray[np.uint8]]) -> None:
+        for frame in frames:
+            self._last = frame
+            shown = caption(frame, self._text)
+            if self._video is None:
+                height, width, _ = shown.shape
+                self._video = VideoWriter(self._path, height=height, width=width, fps=self._fps)
+            self._video.add(shown)

@@ -123,6 +123,22 @@ def test_the_video_has_one_frame_per_decision_and_the_last(tmp_path):
     assert (strips.max(axis=(1, 2, 3)) > 150).all()  # every strip holds a text
 
 
+@pytest.mark.slow
+def test_the_video_of_the_station_shows_motion(tmp_path):
+    policy = ScriptedPolicy()
+    policy.spec = ObservationSpec(("left",), 64, 64, STATE_NAMES)
+    world = EnvironmentConfig(max_actions=2)
+    filmed = EvaluationConfig(1, environment=world, video=tmp_path / "seen")
+    played = evaluate(policy, filmed)
+    assert played == evaluate(policy, EvaluationConfig(1, environment=world))
+    clip = VideoClip.whole(tmp_path / "seen" / "episode_1000.mp4")
+    count = check_decodable(clip.path)
+    assert count > 100  # two sub-tasks of several seconds, ten pictures a second
+    frames = clip.frames(range(count)).astype(float)[:-20, :64]
+    moved = np.abs(np.diff(frames, axis=0)).mean(axis=(1, 2, 3))
+    assert (moved > 0.05).mean() > 0.5
+
+
 def test_a_policy_without_cameras_can_be_filmed_and_sees_no_picture(tmp_path):
     policy = ScriptedPolicy()
     policy.spec = ObservationSpec((), 0, 0, STATE_NAMES, FLAGS)
