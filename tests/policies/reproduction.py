@@ -8,12 +8,14 @@ from filtering.judging.evidence import Evidence
 from filtering.segmentation.metrics import TOLERANCES
 from policies.experiments.reproduce.exhibits.salads import judge_salads
 from policies.experiments.reproduce.methods import (
+    NORM,
+    OURS,
     Question,
     judge_all,
     judge_thresholds,
     weigh_all,
 )
-from policies.experiments.reproduce.plan import Plan, Size
+from policies.experiments.reproduce.plan import UNLABELLED, Plan, Size
 from teasim.pool import Span
 from tests.toy_pool import SEQ_1, SEQ_2
 
@@ -63,6 +65,10 @@ def fake_segmentation(unit, store, workers):
 
 def fake_detection(unit, store, workers):
     said = judged(unit.kind, tuple((kind, count) for kind, count in unit.spec["kinds"]))
+    if unit.spec["segmenter"] == UNLABELLED:  # the default filter says the same as the norm
+        methods = said.get("methods", said)
+        ours = {OURS: methods[NORM], **methods}
+        said = said | {"methods": ours} if "methods" in said else ours
     return {"pools": [said] * unit.spec["pools"]}
 
 
@@ -82,7 +88,7 @@ def fake_policies(unit, store, workers):
         | spread
         | change
         for learner in unit.spec["learners"]
-        for name in ("all", "filtered", "oracle")
+        for name in ("all", "filtered", "oracle", "length", "random")
         for mode in ("deterministic", "sampled")
     ]
     detection = [{"filter": "filtered", "recall": 1.0, "false_alarms": 0.1}]

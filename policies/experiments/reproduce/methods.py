@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from filtering.demo_filter import DemoFilter
 from filtering.judging.baselines import BASELINES
 from filtering.judging.config import JudgingConfig
 from filtering.judging.equation3.problem import Problem
@@ -16,11 +17,19 @@ from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.solvers import solver_named
 from filtering.judging.evidence import Evidence
 from filtering.judging.judges import by_norm
-from filtering.judging.thresholds import group_weights, probability_incorrect
+from filtering.judging.thresholds import (
+    Grouping,
+    as_many_as_asked,
+    group_weights,
+    probability_incorrect,
+)
 from policies.experiments.detection import Judged, told_how_many
 
-OURS = "norm"
-"""The method that is compared with the paper's numbers."""
+OURS = "default filter"
+"""What `teasim filter` does unless it is told otherwise: it finds the sub-tasks by itself, so that
+no fitted segmenter goes with it. Compared with the paper's numbers from videos alone."""
+NORM = "norm"
+"""The score norm on given segments. Compared with the paper's numbers at its own segmentation."""
 LEARNED = "norm, learned decision"
 """The same score with the learned decision."""
 THRESHOLDS = ("kmeans", "gmm", "minibatch")
@@ -41,6 +50,8 @@ class Question:
     """(D,) kind of each demonstration, 0 is correct."""
     names: tuple[str, ...]
     """(D,) identity of each demonstration."""
+    alone: DemoFilter | None = None
+    """The default filter, fitted to the videos of the pool; None where segments are given."""
     seed: int = 0
     """Seed of random answers."""
 
@@ -64,6 +75,11 @@ class Answer:
 
 Method = Callable[[Question], Answer]
 """Judges a pool."""
+
+
+def from_videos(fitted: DemoFilter) -> Answer:
+    """Return what the default filter said of a pool."""
+    return Answer(fitted.flagged_, fitted.losses_, fitted.probabilities_)
 
 
 def norm(question: Question) -> Answer:
@@ -112,7 +128,7 @@ def oracle(question: Question) -> Answer:
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        OURS: norm,
+        NORM: norm,
         LEARNED: learned,
         "equation 3": equation_3,
         "length": length,
@@ -120,14 +136,14 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "oracle": oracle,
     }
 )
-"""Every method by its name in the tables."""
+"""Every method that judges given segments, by its name in the tables."""
 
 
 def judge_all(question: Question) -> dict[str, Any]:
     """Return what every method says about a pool, as JSON can hold it."""
     # The matrices are small: several BLAS threads would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        answers = {name: method(question) for name, method in METHODS.items()}
+        answers = _alone(question) | {name: judge(question) for name, judge in METHODS.items()}
     return {name: as_judged(question, said) for name, said in answers.items()}
 
 
@@ -135,8 +151,9 @@ def judge_thresholds(question: Question) -> dict[str, Any]:
     """Return what each clustering of the weights of equation 3 says, and what the scores do."""
     with threadpool_limits(limits=1, user_api="blas"):
         weights = paper_weights(question.evidence)
-        answers = {f"equation 3, {name}": by_threshold(weights, name) for name in THRESHOLDS}
-        answers |= {name: METHODS[name](question) for name in (OURS, LEARNED)}
+        answers = _alone(question)
+        answers |= {name: METHODS[name](question) for name in (NORM, LEARNED)}
+        answers |= {f"equation 3, {name}": by_threshold(weights, name) for name in THRESHOLDS}
     return {name: as_judged(question, said) for name, said in answers.items()}
 
 
@@ -150,12 +167,22 @@ def weigh_all(question: Question) -> dict[str, Any]:
         weights = {f"equation 3, {s}": paper_weights(question.evidence, s) for s in SOLVERS}
         grouped = {name: (w, group_weights(w, told).groups) for name, w in weights.items()}
         found = by_norm(question.evidence, JudgingConfig(groups=told))
-        grouped[OURS] = (found.weights, found.grouping.groups)
+        grouped[NORM] = (found.weights, found.grouping.groups)
+    if question.alone is not None:
+        fitted = question.alone
+        natures = Grouping(fitted.groups_, fitted.threshold_, fitted.group_names_)
+        groups = as_many_as_asked(natures, fitted.weights_, told).groups
+        grouped = {OURS: (fitted.weights_, groups), **grouped}
     said = {
         name: {"weights": w.tolist(), "groups": groups.tolist()}
         for name, (w, groups) in grouped.items()
     }
     return {"names": list(question.names), "kinds": question.kinds.tolist(), "methods": said}
+
+
+def _alone(question: Question) -> dict[str, Answer]:
+    """Return what the default filter said, where it was asked."""
+    return {} if question.alone is None else {OURS: from_videos(question.alone)}
 
 
 def by_threshold(weights: NDArray[np.float64], threshold: str) -> Answer:

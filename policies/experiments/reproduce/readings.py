@@ -45,14 +45,18 @@ class Reading:
 
 
 def read(pool: Pool, segmenter: str, frames: int) -> Reading:
-    """Segment all demonstrations of `pool` from its videos.
+    """Segment all demonstrations of `pool` from its videos and describe the segments.
 
     Args:
         pool: the demonstrations.
         segmenter: as in `teasim filter`.
         frames: largest number of frames per segment for its features.
     """
-    found = segmenter_named(segmenter)(pool, workers=IN_PROCESS)
+    return describe(pool, segmenter_named(segmenter)(pool, workers=IN_PROCESS), frames)
+
+
+def describe(pool: Pool, found: Segmentation, frames: int) -> Reading:
+    """Describe the segments that were found in `pool`; see `read`."""
     source = FrameSource(pool.cameras)
     rests = look_at_rests(pool.episodes, found.spans, pool.fps, source, workers=IN_PROCESS)
     features = segment_features(

@@ -8,6 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from filtering.demo_filter import DemoFilter
+from filtering.judging.evidence import Evidence
 from filtering.segmentation.config import FitConfig, MSTCNConfig
 from filtering.segmentation.fit import fit_segmenter
 from filtering.segmentation.metrics import (
@@ -27,7 +29,7 @@ from policies.experiments.reproduce.methods import (
     judge_thresholds,
     weigh_all,
 )
-from policies.experiments.reproduce.readings import Reading, read, read_bank
+from policies.experiments.reproduce.readings import describe, read_bank
 from policies.experiments.units import Result, Store, Unit, Work
 from teasim.common.errors import ConfigError
 from teasim.common.workers import Workers
@@ -93,22 +95,28 @@ def judge_pools(
     pool = Pool.open(store.folder_of(unit.needs["bank"]))
     judged = []
     for number, places in enumerate(drawn(pool, spec["kinds"], spec["row"], spec["pools"])):
-        reading, own = _reading(unit, store, pool, places)
+        evidence, alone = _look(unit, store, pool, places)
         kinds = np.repeat(range(len(spec["kinds"])), [count for _, count in spec["kinds"]])
         names = tuple(pool.episodes[place].demo_id for place in places)
-        judged.append(judge(Question(reading.evidence(own), kinds, names, number)))
+        judged.append(judge(Question(evidence, kinds, names, alone, seed=number)))
     return {"pools": judged}
 
 
-def _reading(
+def _look(
     unit: Unit, store: Store, pool: Pool, places: Sequence[int]
-) -> tuple[Reading, Sequence[int]]:
-    """Return a reading and the places in it of the pool that was drawn."""
+) -> tuple[Evidence, DemoFilter | None]:
+    """Return the evidence about the demonstrations at `places`.
+
+    Without a network the segments are those that the default filter finds; it is returned too.
+    """
     frames = unit.spec["frames"]
     if "network" in unit.needs:
         network = store.folder_of(unit.needs["network"])
-        return read_bank(Path(pool.root).resolve(), network.resolve(), frames), places
-    return read(pool.only(places), unit.spec["segmenter"], frames), range(len(places))
+        reading = read_bank(Path(pool.root).resolve(), network.resolve(), frames)
+        return reading.evidence(places), None
+    part = pool.only(places)
+    fitted = DemoFilter().fit(part)
+    return describe(part, fitted.segments_, frames).evidence(range(len(places))), fitted
 
 
 def drawn(

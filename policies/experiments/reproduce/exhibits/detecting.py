@@ -6,7 +6,7 @@ from typing import Any
 
 from policies.experiments.detection import DetectionScores, Judged, detection_scores
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
-from policies.experiments.reproduce.methods import METHODS, OURS
+from policies.experiments.reproduce.methods import METHODS, NORM, OURS
 from policies.experiments.reproduce.paper import (
     CORRECT,
     DETECTION,
@@ -15,6 +15,7 @@ from policies.experiments.reproduce.paper import (
 )
 from policies.experiments.reproduce.plan import (
     PEOPLE_LEVEL,
+    ROBOT_LEVEL,
     SECONDS_PER_CLUSTERED,
     SECONDS_PER_POOL,
     SEGMENTERS,
@@ -22,10 +23,19 @@ from policies.experiments.reproduce.plan import (
     Plan,
 )
 from policies.experiments.units import Store, Unit
+from teasim.common.figures import AccuracyFigure, Drawing
+from teasim.common.figures.accuracy import Point
 from teasim.common.statistics import Rate
 
 OTHERS: Mapping[str, str] = MappingProxyType({"table2": "seq_2", "table3": "seq_3"})
 """The other demonstrations of each table."""
+COMPARED: Mapping[tuple[str, str], str] = MappingProxyType(
+    {
+        (OURS, UNLABELLED): "ours, from the videos alone",
+        (NORM, PEOPLE_LEVEL): "norm at the paper's level of segmentation",
+    }
+)
+"""Methods and segmenters that are compared with the paper's numbers, and how that is called."""
 INTERVALS = (
     "Rates are in % with 95 % intervals, the wider one of two: with each pool, and with each "
     "demonstration of the bank, as a group of correlated trials. Length and random are told how "
@@ -118,13 +128,18 @@ def segmenters(plan: Plan, k: int) -> list[str]:
     return [name for name in SEGMENTERS if name != UNLABELLED or k in plan.size.unlabelled]
 
 
+def methods(segmenter: str) -> list[str]:
+    """Return the methods of a segmenter; the default filter finds its segments by itself."""
+    return [OURS, *METHODS] if segmenter == UNLABELLED else list(METHODS)
+
+
 def table(plan: Plan, store: Store, name: str) -> Table:
     """Return all rows of a table: k x segmenter x method."""
     rows, words = [], [precision_sentence()]
     for number, printed in enumerate(DETECTION[name]):
         for segmenter in segmenters(plan, printed.k):
             unit = _unit(plan, name, number, segmenter)
-            for method in METHODS:
+            for method in methods(segmenter):
                 scores = detection_scores(judged_by(unit, store, method))
                 rows.append(
                     {
@@ -139,10 +154,32 @@ def table(plan: Plan, store: Store, name: str) -> Table:
                         "paper F1 (printed as precision)": printed.precision,
                     }
                 )
-                if method == OURS and segmenter == PEOPLE_LEVEL:
-                    what = f"{CORRECT} + {printed.k} at the paper's level of segmentation"
+                if (method, segmenter) in COMPARED:
+                    what = f"{CORRECT} + {printed.k}, {COMPARED[method, segmenter]}"
                     words.append(against(what, scores, printed))
     return Table(rows, words, notes=(INTERVALS,))
+
+
+def figures(plan: Plan, store: Store, name: str) -> dict[str, Drawing]:
+    """Return the accuracy over k: of the default filter, of fitted segmenters, and baselines."""
+    shown = {"ours, from videos alone": (OURS, UNLABELLED)}
+    shown |= {f"norm, {SEGMENTERS[s]}": (NORM, s) for s in (PEOPLE_LEVEL, ROBOT_LEVEL)}
+    shown |= {f"{method}, told k": (method, PEOPLE_LEVEL) for method in ("length", "random")}
+    series: dict[str, tuple[Point, ...]] = {}
+    for title, (method, segmenter) in shown.items():
+        points = []
+        for number, printed in enumerate(DETECTION[name]):
+            if segmenter in segmenters(plan, printed.k):
+                judged = judged_by(_unit(plan, name, number, segmenter), store, method)
+                points.append(_point(printed.k, detection_scores(judged).accuracy))
+        series[title] = tuple(points)
+    paper = [(row.k, row.accuracy / 100) for row in DETECTION[name]]
+    series["the paper, one pool"] = tuple(Point(k, share, share, share) for k, share in paper)
+    return {name: AccuracyFigure(series, "accuracy of detection")}
+
+
+def _point(k: int, rate: Rate) -> Point:
+    return Point(k, rate.value, rate.low, rate.high)
 
 
 def _unit(plan: Plan, name: str, number: int, segmenter: str) -> Unit:
@@ -158,6 +195,7 @@ def exhibit(name: str, title: str, paper: str) -> Exhibit:
         paper,
         lambda plan: units(plan, name),
         lambda plan, store: table(plan, store, name),
+        lambda plan, store: figures(plan, store, name),
     )
 
 

@@ -1,12 +1,14 @@
 """What a table or figure of the paper becomes here: units of work, then rows and sentences."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 from policies.experiments.reproduce.plan import Plan
 from policies.experiments.tabular import Rows, html_table, markdown_table
 from policies.experiments.units import Store, Unit
+from teasim.common.figures import Drawing
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,12 @@ class Table:
         return list(self.rows[0]) if self.rows else []
 
 
+def no_figures(plan: Plan, store: Store) -> Mapping[str, Drawing]:
+    """Draw nothing."""
+    del plan, store
+    return {}
+
+
 @dataclass(frozen=True)
 class Exhibit:
     """A table or figure of the paper."""
@@ -40,6 +48,8 @@ class Exhibit:
     """Returns the work it is made from."""
     table: Callable[[Plan, Store], Table]
     """Returns the table, when all units are done."""
+    figures: Callable[[Plan, Store], Mapping[str, Drawing]] = no_figures
+    """Returns figures by file name, when all units are done."""
 
 
 def as_markdown(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
@@ -51,12 +61,20 @@ def as_markdown(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
     return "\n\n".join([*parts, *table.notes]) + "\n"
 
 
-def as_html(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
-    """Write the same section as HTML."""
+def as_html(
+    name: str, exhibit: Exhibit, table: Table, command: str, *, figures: Sequence[str] = ()
+) -> str:
+    """Write the same section as HTML, with the `figures` that are drawn, files beside the page."""
     head = f"<section id='{escape(name)}'><h2>{escape(name)}: {escape(exhibit.title)}</h2>"
     parts = [head, f"<pre>{escape(command)}</pre>", f"<p>The paper: {escape(exhibit.paper)}</p>"]
     if table.not_run:
         return "\n".join([*parts, f"<p>Not run: {escape(table.not_run)}</p></section>"])
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in table.words)
     notes = "".join(f"<p>{escape(note)}</p>" for note in table.notes)
-    return "\n".join([*parts, f"<ul>{items}</ul>", html_table(table.rows), notes, "</section>"])
+    pictures = "".join(
+        f"<figure><img src='{escape(path)}' alt='{escape(Path(path).stem)}' loading='lazy'>"
+        f"<figcaption>{escape(Path(path).stem)}</figcaption></figure>"
+        for path in figures
+    )
+    parts += [f"<ul>{items}</ul>", pictures, html_table(table.rows), notes]
+    return "\n".join([*parts, "</section>"])
