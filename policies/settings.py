@@ -67,9 +67,8 @@ class EvaluationConfig:
     environment: Environment = field(default_factory=EnvironmentConfig)
     """The environment."""
     video: Path | None = None
-    """Folder for videos of the deterministic episodes, from the cameras of the policy, with the
-    chosen sub-task written below the picture. An environment without the method `film` gives one
-    picture per decision."""
+    """Folder for videos of the deterministic episodes: the motion of every sub-task, its name
+    written below it; one picture per decision where an environment shows no motion."""
 
     def __post_init__(self) -> None:
         """Raise ConfigError for less than one episode."""

@@ -1,6 +1,6 @@
 """Demonstrations carried out in physics, frame by frame, from a plan or from a log."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import repeat
 
@@ -153,19 +153,8 @@ def replay(
         simulation.step(target, offset)
 
 
-def run_subtask(
-    simulation: Simulation,
-    subtask: str,
-    style: Style,
-    after_step: Callable[[], None] = lambda: None,
-) -> int:
+def run_subtask(simulation: Simulation, subtask: str, style: Style) -> int:
     """Carry out one sub-task and return the number of control steps it took.
-
-    Args:
-        simulation: The station.
-        subtask: What to do.
-        style: How it is done.
-        after_step: Called after every control step.
 
     Raises:
         SkillError: it cannot be carried out from the present state.
@@ -173,6 +162,5 @@ def run_subtask(
     steps = 0
     for target in perform(subtask, simulation, style):
         simulation.step(target)
-        after_step()
         steps += 1
     return steps

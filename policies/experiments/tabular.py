@@ -21,6 +21,8 @@ STYLE = (
     "table{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}"
     "th,td{border:1px solid #ccc;padding:2px 8px;text-align:left}"
     "pre{background:#f4f4f4;padding:.5em;overflow-x:auto}"
+    "figure{display:inline-block;margin:0 1em 1em 0}figure img{max-width:min(540px,100%)}"
+    "figcaption{font-size:12px;color:#56616a}"
 )
 """CSS of a page."""
 

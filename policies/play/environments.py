@@ -1,13 +1,16 @@
 """Environments in which policies are evaluated, and what an environment reports of an episode."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from importlib import import_module
 from typing import Any
 
 import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
 
 from policies.data.samples import ObservationSpec
 from policies.play.remembering import Remembering, can_remember
+from policies.play.video import FILM
 from policies.settings import SUBTASK_ENVIRONMENT, EnvironmentConfig
 from teasim.common.errors import ConfigError
 
@@ -23,8 +26,8 @@ def make_environment(
 ) -> gym.Env[Any, Any]:
     """Make the environment with the observations that a policy of `spec` needs.
 
-    `filmed` adds rendering for a policy without cameras; a policy with cameras needs none. Further
-    `settings` are passed on to the environment.
+    `filmed` is for videos: the environment shows its motion if it can; otherwise rendering is added
+    for a policy without cameras. Further `settings` are passed on to the environment.
 
     Raises:
         ConfigError: there is no such environment, or it does not take the settings.
@@ -33,15 +36,15 @@ def make_environment(
     if spec.cameras:
         size = {"width": spec.width, "height": spec.height}
         sight = {"obs_type": "pixels_agent_pos", "cameras": spec.cameras, **size}
-    elif filmed:
-        sight["render_mode"] = "rgb_array"
+    env_id = config.env_id or SUBTASK_ENVIRONMENT
+    if filmed and (FILM in render_modes(env_id) or not spec.cameras):
+        sight["render_mode"] = FILM if FILM in render_modes(env_id) else "rgb_array"
     if len(sight) > 1:
         sight["quality"] = config.quality  # of pictures, which some environments do not have
         if config.look != "fixed":
             sight["look"] = config.look
     if config.max_actions is not None:
         sight["max_actions"] = config.max_actions
-    env_id = config.env_id or SUBTASK_ENVIRONMENT
     try:
         return gym.make(env_id, randomize=config.randomize, **sight, **settings)
     except (gym.error.Error, TypeError, ImportError) as error:
@@ -49,11 +52,24 @@ def make_environment(
         raise ConfigError(f"Cannot make the environment '{env_id}': {reason}") from error
 
 
+def render_modes(env_id: str) -> Sequence[str]:
+    """Return the render modes that an environment names; none if they are not known before."""
+    module, _, name = env_id.rpartition(":")
+    try:
+        if module:
+            import_module(module)  # registers its environments
+        entry = gym.spec(name).entry_point
+        made: Any = load_env_creator(entry) if isinstance(entry, str) else entry
+    except (gym.error.Error, ImportError, AttributeError):
+        return ()  # making the environment tells why
+    return tuple(getattr(made, "metadata", {}).get("render_modes", ()))
+
+
 @contextmanager
 def worlds(config: EnvironmentConfig, *, filmed: bool = False) -> Iterator[World]:
     """Provide environments by observation spec; policies with equal specs share one.
 
-    An environment that is filmed simulates everything, also what has been simulated before.
+    What is `filmed` is simulated anew, because a remembered decision shows no motion.
     """
     with ExitStack() as stack:
         made: dict[ObservationSpec, gym.Env[Any, Any]] = {}

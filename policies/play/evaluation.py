@@ -90,34 +90,42 @@ def evaluate_all(
     ]
 
 
+@dataclass(frozen=True)
+class Studio:
+    """Where deterministic episodes are filmed."""
+
+    env: gym.Env[Any, Any]
+    """Environment that shows its motion, if it can."""
+    folder: Path
+    """Folder of the videos."""
+
+
 def play(
-    env: gym.Env[Any, Any], policy: Policy, seeds: Sequence[int], film: Path | None = None
+    env: gym.Env[Any, Any], policy: Policy, seeds: Sequence[int], studio: Studio | None = None
 ) -> dict[str, list[Episode]]:
-    """Run the scenes `seeds` in both modes; `film` is a folder for the deterministic ones."""
+    """Run the scenes `seeds` in both modes; the deterministic ones in the `studio`, if any."""
     with one_thread():
-        return {
-            mode: [
-                run_episode(
-                    env,
-                    policy,
-                    seed,
-                    deterministic=mode == "deterministic",
-                    video=film / f"episode_{seed}.mp4" if film and mode == MODES[0] else None,
-                )
-                for seed in seeds
-            ]
-            for mode in MODES
-        }
+        return {mode: [_run(env, policy, seed, mode, studio) for seed in seeds] for mode in MODES}
+
+
+def _run(
+    env: gym.Env[Any, Any], policy: Policy, seed: int, mode: str, studio: Studio | None
+) -> Episode:
+    sure = mode == "deterministic"
+    if studio is None or not sure:
+        return run_episode(env, policy, seed, deterministic=sure)
+    video = studio.folder / f"episode_{seed}.mp4"
+    return run_episode(studio.env, policy, seed, deterministic=sure, video=video)
 
 
 def _play_batch(batch: SubtaskBatch) -> list[dict[str, list[Episode]]]:
     """Run `batch` in environments made in this worker."""
-    film = batch.config.video
-    with worlds(batch.config.environment, filmed=film is not None) as world:
-        return [
-            play(world(policy.spec), policy, batch.seeds, None if n else film)
-            for n, policy in enumerate(batch.policies)
-        ]
+    config, film = batch.config.environment, batch.config.video
+    first, *others = batch.policies
+    with worlds(config) as world, worlds(config, filmed=True) as filmed:
+        studio = None if film is None else Studio(filmed(first.spec), film)
+        played = [play(world(first.spec), first, batch.seeds, studio)]
+        return played + [play(world(policy.spec), policy, batch.seeds) for policy in others]
 
 
 def score(mode: str, episodes: Sequence[Episode], subtasks: Sequence[str]) -> Scores:

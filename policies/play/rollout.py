@@ -1,6 +1,7 @@
 """One episode of a policy in the sub-task environment, decision by decision."""
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from policies.data.samples import Observation, Policy
 from policies.play.environments import reported
 from policies.play.outcomes import Played
-from policies.play.video import EpisodeVideo
+from policies.play.video import Film
 from teasim.common.errors import CheckpointError
 
 
@@ -59,18 +60,19 @@ def run_episode(
     observation, info = env.reset(seed=seed)
     check_fit(policy, observation, info)
     actions: list[Action] = []
-    state = None
-    film = None if video is None else EpisodeVideo(video, env, policy)
-    start, done = np.ones(1, dtype=np.bool_), False
-    while not done:
-        choice, state = policy.predict(observation, state, start, deterministic)
-        actions.append(_judge(int(choice), info))
+    state, start, done = None, np.ones(1, dtype=np.bool_), False
+    with nullcontext() if video is None else Film(video, env, policy) as film:
+        while not done:
+            choice, state = policy.predict(observation, state, start, deterministic)
+            actions.append(_judge(int(choice), info))
+            if film is not None:
+                film.before(observation, actions[-1].name)
+            observation, _, terminated, truncated, info = env.step(int(choice))
+            if film is not None:
+                film.after()
+            start, done = np.zeros(1, dtype=np.bool_), terminated or truncated
         if film is not None:
-            film.choose(observation, actions[-1].name)
-        observation, _, terminated, truncated, info = env.step(int(choice))
-        start, done = np.zeros(1, dtype=np.bool_), terminated or truncated
-    if film is not None:
-        film.end(observation, bool(info["success"]))
+            film.end(observation, bool(info["success"]))
     return Episode(**reported(env, seed, info), actions=tuple(actions))
 
 

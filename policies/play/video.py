@@ -1,8 +1,7 @@
-"""Videos of an episode, with the chosen sub-task below the picture."""
+"""Videos of an episode: the motion of every sub-task, with its name below it."""
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import gymnasium as gym
@@ -12,60 +11,21 @@ from numpy.typing import NDArray
 from policies.data.samples import Observation, Policy, pictures
 from teasim.pool.clips import VideoWriter
 
+FILM = "rgb_array_list"
+"""Render mode of environments that take pictures in the middle of an action."""
 STRIP = 24
 """Height of the strip below the picture [pixel]; even, as the video codec needs it."""
 LARGEST = 0.5
 """Largest font scale; a long text below a narrow picture gets a smaller one."""
 WHITE = (255, 255, 255)
 """Colour of the text, RGB."""
+ENDING = 2.0
+"""Time for which the last picture is shown, with whether the goal was reached [s]."""
 
 
-class EpisodeVideo:
-    """The video of one episode, an mp4 file that is written while it is played.
-
-    An environment that can be filmed (`env.unwrapped.film`) is seen in motion, at the frame rate
-    that its metadata name; of another one there is a picture per decision, one a second.
-    """
-
-    def __init__(self, path: Path, env: gym.Env[Any, Any], policy: Policy) -> None:
-        """Begin to film; the folder of `path` is created."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._path, self._env, self._policy = path, env, policy
-        self._film: Callable[..., None] | None = getattr(env.unwrapped, "film", None)
-        self._fps = int(env.unwrapped.metadata["render_fps"]) if self._film else 1
-        self._text, self._count = "", 0
-        self._writer: VideoWriter | None = None
-        if self._film:
-            self._film(self._take)
-
-    def choose(self, observation: Observation, name: str) -> None:
-        """Go on with sub-task `name`, which was chosen by `observation`."""
-        self._count += 1
-        self._text = f"{self._count} {name}"
-        if not self._film:
-            self._add(picture(self._env, observation, self._policy))
-
-    def end(self, observation: Observation, success: bool) -> None:
-        """Show for a second what was reached, and close the file."""
-        self._text = "goal reached" if success else "goal not reached"
-        last = picture(self._env, observation, self._policy)
-        for _ in range(self._fps):
-            self._add(last)
-        if self._film:
-            self._film(None)
-        if self._writer is not None:
-            self._writer.close()
-
-    def _take(self, seen: Mapping[str, NDArray[np.uint8]]) -> None:
-        cameras = self._policy.spec.cameras or tuple(seen)[:1]
-        self._add(np.hstack([seen[camera] for camera in cameras]))
-
-    def _add(self, frame: NDArray[np.uint8]) -> None:
-        captioned = caption(frame, self._text)
-        if self._writer is None:
-            height, width, _ = captioned.shape
-            self._writer = VideoWriter(self._path, height=height, width=width, fps=self._fps)
-        self._writer.add(captioned)
+def moves(env: gym.Env[Any, Any]) -> bool:
+    """Tell whether `env` takes pictures in the middle of an action."""
+    return env.render_mode == FILM and FILM in env.unwrapped.metadata["render_modes"]
 
 
 def picture(env: gym.Env[Any, Any], observation: Observation, policy: Policy) -> NDArray[np.uint8]:
@@ -87,3 +47,64 @@ def caption(frame: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
     line = cv2.LINE_AA
     cv2.putText(strip, text, (2, STRIP - 8), cv2.FONT_HERSHEY_SIMPLEX, scale, WHITE, 1, line)
     return np.vstack([frame, strip])
+
+
+class Film:
+    """The video of one episode, written while it is played.
+
+    Where the environment shows no motion there is one picture per decision, a second each.
+    """
+
+    def __init__(self, path: Path, env: gym.Env[Any, Any], policy: Policy) -> None:
+        """Film `policy` in `env`; `path` is an mp4 file, whose folder is made."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._path, self._env, self._policy = path, env, policy
+        self._moves = moves(env)
+        self._fps = float(env.unwrapped.metadata["render_fps"]) if self._moves else 1.0
+        self._video: VideoWriter | None = None
+        self._last: NDArray[np.uint8] | None = None
+        self._decisions = 0
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        """Finish the file, or leave it if the episode failed."""
+        if self._video is not None:
+            self._video.abort() if kind else self._video.close()
+
+    def before(self, observation: Observation, name: str) -> None:
+        """Show what there is before sub-task `name`, which is written below it and its motion."""
+        self._decisions += 1
+        self._text = f"{self._decisions} {name}"
+        if self._moves:
+            self._add(self._taken())  # the start of the episode
+        else:
+            self._add([picture(self._env, observation, self._policy)])
+
+    def after(self) -> None:
+        """Show the motion of the sub-task."""
+        if self._moves:
+            self._add(self._taken())
+
+    def end(self, observation: Observation, success: bool) -> None:
+        """Show how it ended."""
+        self._text = "goal reached" if success else "goal not reached"
+        if not self._moves:
+            self._add([picture(self._env, observation, self._policy)])
+        elif self._last is not None:
+            self._add([self._last] * round(ENDING * self._fps))
+
+    def _taken(self) -> list[NDArray[np.uint8]]:
+        frames: Any = self._env.render()
+        return list(frames)
+
+    def _add(self, frames: list[NDArray[np.uint8]]) -> None:
+        for frame in frames:
+            self._last = frame
+            shown = caption(frame, self._text)
+            if self._video is None:
+                height, width, _ = shown.shape
+                self._video = VideoWriter(self._path, height=height, width=width, fps=self._fps)
+            self._video.add(shown)

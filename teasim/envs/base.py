@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 
 from teasim.common.errors import ConfigError
-from teasim.constants import FPS
+from teasim.constants import FPS, UPDATES_PER_CONTROL
 from teasim.envs.observations import observation_space, observe
 from teasim.envs.reports import VIOLATION_METADATA, report
 from teasim.render import StationRenderer
@@ -22,6 +22,9 @@ from teasim.world.station import draw_layout
 
 RENDER_SIZE = (480, 640)
 """Height and width of `render()` when the observations hold no pictures [pixels]."""
+
+FILM = "rgb_array_list"
+"""Render mode that takes pictures at every control step, also in the middle of an action."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
     """
 
     metadata = {  # noqa: RUF012 (as Gymnasium declares it)
-        "render_modes": ["rgb_array"],
+        "render_modes": ["rgb_array", FILM],
         "render_fps": FPS,
         **VIOLATION_METADATA,
     }
@@ -73,7 +76,9 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
             cameras: Cameras of the `pixels` observation; `render()` uses the first one.
             width: Width of the pictures [pixels].
             height: Height of the pictures [pixels].
-            render_mode: None or rgb_array.
+            render_mode: None, rgb_array, or rgb_array_list: `render()` then returns the pictures of
+                all control steps since it was last called, `FPS` per second, all cameras side by
+                side.
             quality: Quality of the pictures, fast or nice; nice renders 20 to 40 times slower.
             randomize: Move and turn the things on the table at every reset.
             look: fixed, or random: light, colours, cameras and distractors change at every reset.
@@ -82,7 +87,8 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
             ConfigError: an argument is unknown or out of range.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ConfigError(f"Unknown render_mode '{render_mode}'; choose None or rgb_array.")
+            modes = ", ".join(self.metadata["render_modes"])
+            raise ConfigError(f"Unknown render_mode '{render_mode}'; choose None, {modes}.")
         check_picture(width, height, quality)
         self.render_mode = render_mode
         self._cameras = check_cameras(cameras)
@@ -95,6 +101,10 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         names = self._simulation.embodiment.state_names
         self.observation_space = observation_space(obs_type, names, self._cameras, self._size)
         self._renderer: StationRenderer | None = None
+        self._film: list[np.ndarray] = []
+        self._updates = 0
+        if render_mode == FILM:
+            self._simulation.observers.append(self._take)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -108,12 +118,17 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
         self._simulation.reset(draw_layout(self.np_random, randomize=randomize))
         if self._look_kind == "random":  # otherwise nothing is drawn, and layouts stay
             self._wear(sample_look(self.np_random))
+        if self.render_mode == FILM:  # things coming to rest are no part of the episode
+            self._film, self._updates = [self._side_by_side()], 0
         return self._observation(), self._info(self._verdict())
 
     def render(self) -> Any:
-        """Return a picture (height, width, 3) uint8 of the first camera, or None."""
+        """Return a picture (height, width, 3) uint8 of the first camera, a film, or None."""
         if self.render_mode is None:
             return None
+        if self.render_mode == FILM:
+            taken, self._film = self._film, []
+            return taken
         return self._pictures().frames(self._cameras[:1])[self._cameras[0]]
 
     def masks(self) -> dict[str, np.ndarray]:
@@ -175,6 +190,16 @@ class StationEnv(gymnasium.Env[dict[str, Any], Any]):
                 look=self._look,
             )
         return self._renderer
+
+    def _side_by_side(self) -> np.ndarray:
+        """Return the pictures of all cameras, (height, K * width, 3)."""
+        return np.hstack(list(self._pictures().frames(self._cameras).values()))
+
+    def _take(self) -> None:
+        """Take a picture after the last update of a control step."""
+        self._updates += 1
+        if self._updates % UPDATES_PER_CONTROL == 0:
+            self._film.append(self._side_by_side())
 
     def _wear(self, look: Look) -> None:
         self._look = look

@@ -1,6 +1,6 @@
 """`teasim/TeaMakingSubtasks-v0`: every action is a whole sub-task, carried out in full physics."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,6 @@ from teasim.envs.decisions import (
 from teasim.rollout import run_subtask
 from teasim.skills.style import Style
 
-Take = Callable[[Mapping[str, np.ndarray]], None]
-"""Receives what the cameras see."""
 REFUSED_SECONDS = 1.0
 """Rest after an action that cannot be carried out from the present state [s]."""
 
@@ -54,16 +52,6 @@ class TeaMakingSubtasksEnv(StationEnv):
         super().__init__(**kwargs)
         self.action_space = spaces.Discrete(len(SUBTASKS))
         self._actions = 0
-        self._take: Take | None = None
-
-    def film(self, take: Take | None) -> None:
-        """Show every control step of the sub-tasks to come; None stops it.
-
-        Args:
-            take: Called after every control step with what all cameras see, (height, width, 3)
-                uint8 each.
-        """
-        self._take = take
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -90,7 +78,7 @@ class TeaMakingSubtasksEnv(StationEnv):
 
     def _carry_out(self, subtask: str) -> str:
         try:
-            run_subtask(self._simulation, subtask, Style(), self._show)
+            run_subtask(self._simulation, subtask, Style())
         except SkillError as error:
             self._recover()
             return str(error)
@@ -101,11 +89,6 @@ class TeaMakingSubtasksEnv(StationEnv):
         target = np.array(self._simulation.target)
         for _ in range(round(REFUSED_SECONDS / CONTROL_TIMESTEP)):
             self._simulation.step(target)
-            self._show()
-
-    def _show(self) -> None:
-        if self._take is not None:
-            self._take(self._pictures().frames(self._cameras))
 
     def _progress(self) -> Any:
         return self._actions

@@ -117,6 +117,28 @@ def test_pictures_are_those_of_the_first_camera(make, name):
 
 
 @each_env
+def test_a_film_shows_every_control_step_of_an_action(make, name):
+    view = {"obs_type": "pixels", "width": 64, "height": 48, "cameras": ("left", "cup")}
+    env, quiet = make(name, render_mode="rgb_array_list", **view), make(name, **view)
+    for one in (env, quiet):
+        one.reset(seed=0)
+    (first,) = env.render()
+    assert first.shape == (48, 128, 3)
+    assert env.render() == []
+    action = env.action_space.sample() if name == "TeaMaking" else 0
+    (seen, *_), (other, *_) = (one.step(action) for one in (env, quiet))
+    assert all(
+        (seen["pixels"][camera] == other["pixels"][camera]).all() for camera in ("left", "cup")
+    )
+    taken = env.render()
+    assert (len(taken) == 1) == (name == "TeaMaking")
+    assert (taken[-1] == np.hstack([seen["pixels"]["left"], seen["pixels"]["cup"]])).all()
+    if name == "TeaMakingSubtasks":
+        assert len(taken) > 20
+        assert len({picture.tobytes() for picture in taken}) > len(taken) / 2
+
+
+@each_env
 def test_closing_twice_is_harmless_and_pictures_come_back(make, name):
     env = make(name, render_mode="rgb_array", obs_type="pixels", **ONE_CAMERA)
     before, _ = env.reset(seed=0)
@@ -159,7 +181,7 @@ BAD = {
         f"Unknown obs_type 'smell'; choose {', '.join(OBS_TYPES)}.",
     ),
     "cameras": (("back",), "Unknown camera 'back'; choose left, cup, front, top."),
-    "render_mode": ("ansi", "Unknown render_mode 'ansi'; choose None or rgb_array."),
+    "render_mode": ("ansi", "Unknown render_mode 'ansi'; choose None, rgb_array, rgb_array_list."),
     "quality": ("great", "Unknown quality 'great'; choose fast, nice."),
     "width": (0, "The width is 0 pixels; choose from 1 to 4096."),
     "height": (5000, "The height is 5000 pixels; choose from 1 to 4096."),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from teasim.common.errors import ConfigError
-from teasim.constants import FPS, SUBTASKS
+from teasim.constants import SUBTASKS
 from teasim.task.recipes import SEQ_1
 
 TURN_ON, ADD_WATER, _, _, ADD_TEA_BAG, STIR, TURN_OFF = range(7)
@@ -109,23 +109,3 @@ def test_a_skill_goes_on_from_a_state_bit_for_bit(make):
         assert values.tobytes() == second[0][key].tobytes()
     assert first[1:] == second[1:]
     assert first[3]  # the action before it was counted, too
-
-
-def test_every_control_step_can_be_filmed_and_filming_changes_nothing(make):
-    env = make("TeaMakingSubtasks", width=32, height=32)
-    env.reset(seed=3)
-    seen, times = [], []
-    env.unwrapped.film(lambda pictures: (seen.append(pictures), times.append(len(seen))))
-    filmed, *_, info = env.step(TURN_ON)
-    env.unwrapped.film(None)
-    assert len(seen) == round(info["time"] * FPS)
-    assert {name: picture.shape for name, picture in seen[0].items()} == {
-        "left": (32, 32, 3),
-        "cup": (32, 32, 3),
-    }
-    env.step(ADD_TEA_BAG)
-    assert len(seen) == times[-1]
-    env.reset(seed=3)
-    plain, *_ = env.step(TURN_ON)
-    for name in plain:
-        np.testing.assert_array_equal(plain[name], filmed[name])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from filtering.demo_filter import DemoFilter
 from filtering.judging.baselines import BASELINES
 from filtering.judging.config import JudgingConfig
 from filtering.judging.equation3.problem import Problem
@@ -16,13 +17,19 @@ from filtering.judging.equation3.sequence import transitions
 from filtering.judging.equation3.solvers import solver_named
 from filtering.judging.evidence import Evidence
 from filtering.judging.judges import by_norm
-from filtering.judging.thresholds import group_weights, probability_incorrect
+from filtering.judging.thresholds import (
+    Grouping,
+    as_many_as_asked,
+    group_weights,
+    probability_incorrect,
+)
 from policies.experiments.detection import Judged, told_how_many
 
-OURS = "teasim filter"
-"""The default filter, which is compared with the paper's numbers."""
+OURS = "default filter"
+"""What `teasim filter` does: it finds the sub-tasks by itself or with a fitted network, and looks
+at moments of the videos. Compared with the paper's numbers."""
 NORM = "norm"
-"""Its score on sub-tasks alone."""
+"""The score norm on given segments. Compared with the paper's numbers at its own segmentation."""
 LEARNED = "norm, learned decision"
 """The same score with the learned decision."""
 THRESHOLDS = ("kmeans", "gmm", "minibatch")
@@ -43,10 +50,10 @@ class Question:
     """(D,) kind of each demonstration, 0 is correct."""
     names: tuple[str, ...]
     """(D,) identity of each demonstration."""
+    alone: DemoFilter | None = None
+    """The default filter, fitted to the videos of the pool; None where it is not asked."""
     seed: int = 0
     """Seed of random answers."""
-    ours: "Answer | None" = None
-    """What the default filter says about the videos; None where there are none."""
 
     @property
     def wrong(self) -> NDArray[np.bool_]:
@@ -68,6 +75,11 @@ class Answer:
 
 Method = Callable[[Question], Answer]
 """Judges a pool."""
+
+
+def from_videos(fitted: DemoFilter) -> Answer:
+    """Return what the default filter said of a pool."""
+    return Answer(fitted.flagged_, fitted.losses_, fitted.probabilities_)
 
 
 def norm(question: Question) -> Answer:
@@ -124,16 +136,14 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "oracle": oracle,
     }
 )
-"""Every method that judges evidence, by its name in the tables; beside them stands OURS."""
+"""Every method that judges given segments, by its name in the tables."""
 
 
 def judge_all(question: Question) -> dict[str, Any]:
     """Return what every method says about a pool, as JSON can hold it."""
     # The matrices are small: several BLAS threads would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        answers = {name: method(question) for name, method in METHODS.items()}
-    if question.ours is not None:
-        answers = {OURS: question.ours, **answers}
+        answers = _alone(question) | {name: judge(question) for name, judge in METHODS.items()}
     return {name: as_judged(question, said) for name, said in answers.items()}
 
 
@@ -141,8 +151,9 @@ def judge_thresholds(question: Question) -> dict[str, Any]:
     """Return what each clustering of the weights of equation 3 says, and what the scores do."""
     with threadpool_limits(limits=1, user_api="blas"):
         weights = paper_weights(question.evidence)
-        answers = {f"equation 3, {name}": by_threshold(weights, name) for name in THRESHOLDS}
+        answers = _alone(question)
         answers |= {name: METHODS[name](question) for name in (NORM, LEARNED)}
+        answers |= {f"equation 3, {name}": by_threshold(weights, name) for name in THRESHOLDS}
     return {name: as_judged(question, said) for name, said in answers.items()}
 
 
@@ -157,11 +168,21 @@ def weigh_all(question: Question) -> dict[str, Any]:
         grouped = {name: (w, group_weights(w, told).groups) for name, w in weights.items()}
         found = by_norm(question.evidence, JudgingConfig(groups=told))
         grouped[NORM] = (found.weights, found.grouping.groups)
+    if question.alone is not None:
+        fitted = question.alone
+        natures = Grouping(fitted.groups_, fitted.threshold_, fitted.group_names_)
+        groups = as_many_as_asked(natures, fitted.weights_, told).groups
+        grouped = {OURS: (fitted.weights_, groups), **grouped}
     said = {
         name: {"weights": w.tolist(), "groups": groups.tolist()}
         for name, (w, groups) in grouped.items()
     }
     return {"names": list(question.names), "kinds": question.kinds.tolist(), "methods": said}
+
+
+def _alone(question: Question) -> dict[str, Answer]:
+    """Return what the default filter said, where it was asked."""
+    return {} if question.alone is None else {OURS: from_videos(question.alone)}
 
 
 def by_threshold(weights: NDArray[np.float64], threshold: str) -> Answer:

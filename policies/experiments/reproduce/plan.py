@@ -22,7 +22,7 @@ PEOPLE_LEVEL = "people"
 ROBOT_LEVEL = "robot"
 """Segmenter at our level: MS-TCN++ fitted to other videos of the robot."""
 UNLABELLED = "clustering"
-"""Segmenter without labels; it is fitted to every pool anew."""
+"""Segmenter without labels, that of the default filter; it is fitted to every pool anew."""
 SEGMENTERS: Mapping[str, str] = MappingProxyType(
     {
         PEOPLE_LEVEL: "MS-TCN++ fitted to people",
@@ -43,8 +43,10 @@ SECONDS_PER_POOL = 3.0
 """Judging a pool by all methods, mostly SLSQP [s]."""
 SECONDS_PER_CLUSTERED = 9.0
 """Clustering the videos of a pool and judging it [s]."""
+SECONDS_PER_PICTURED = 8.0
+"""Learning a policy from pictures [s]."""
 SECONDS_PER_FILTERED = 12.0
-"""Judging a pool by the default filter, the videos looked at already [s]."""
+"""Judging a pool by the default filter with a network, the videos looked at already [s]."""
 SECONDS_PER_EPISODE = 2.0
 """An episode of a policy [s]; episodes that repeat another's decisions are nearly free."""
 

@@ -15,11 +15,9 @@ from filtering.judging.evidence import Evidence
 from filtering.segmentation.segmenter import segmenter_named
 from filtering.segmentation.segments import Segmentation
 from filtering.vision.frame_features import FrameSource
-from filtering.vision.frames import frame_rate
 from teasim.common.arrays import Array
 from teasim.common.workers import IN_PROCESS
 from teasim.pool import Pool
-from teasim.pool.source import Source
 
 
 @dataclass(frozen=True)
@@ -46,17 +44,21 @@ class Reading:
         )
 
 
-def read(pool: Source, segmenter: str, frames: int) -> Reading:
-    """Segment all demonstrations of `pool` from its videos.
+def read(pool: Pool, segmenter: str, frames: int) -> Reading:
+    """Segment all demonstrations of `pool` from its videos and describe the segments.
 
     Args:
         pool: the demonstrations.
         segmenter: as in `teasim filter`.
         frames: largest number of frames per segment for its features.
     """
-    found = segmenter_named(segmenter)(pool, workers=IN_PROCESS)
+    return describe(pool, segmenter_named(segmenter)(pool, workers=IN_PROCESS), frames)
+
+
+def describe(pool: Pool, found: Segmentation, frames: int) -> Reading:
+    """Describe the segments that were found in `pool`; see `read`."""
     source = FrameSource(pool.cameras)
-    rests = look_at_rests(pool.episodes, found.spans, frame_rate(pool), source, workers=IN_PROCESS)
+    rests = look_at_rests(pool.episodes, found.spans, pool.fps, source, workers=IN_PROCESS)
     features = segment_features(
         pool,
         found.spans,

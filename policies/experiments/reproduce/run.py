@@ -1,8 +1,8 @@
-"""The verb `reproduce`: the work, then a page, and a CSV and Markdown file for every exhibit."""
+"""The verb `reproduce`: the work, then a page, and figures, CSV and Markdown for every exhibit."""
 
-import re
 import sys
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table, as_html, as_markdown
@@ -13,9 +13,12 @@ from policies.experiments.tabular import html_page, write_rows
 from policies.experiments.units import Store, Unit, do_units, missing
 from policies.settings import ReproduceSettings
 from teasim.common.errors import ConfigError
-from teasim.common.figures import can_draw, save_figures
+from teasim.common.figures import Drawing, save_figures
 from teasim.common.files import write_text
 from teasim.common.registry import named
+
+FIGURES = "figures"
+"""Folder of the figures in the output folder."""
 
 
 def run_reproduction(settings: ReproduceSettings) -> str:
@@ -37,7 +40,12 @@ def run_reproduction(settings: ReproduceSettings) -> str:
     print(estimate, file=sys.stderr)
     do_units(units, store, WORKS, workers=settings.workers)
     tables = {name: exhibit.table(plan, store) for name, exhibit in chosen.items()}
-    write_pages(settings.out, chosen, tables, command)
+    drawn = {
+        name: draw(settings.out, exhibit.figures(plan, store))
+        for name, exhibit in chosen.items()
+        if not tables[name].not_run
+    }
+    write_pages(settings.out, chosen, tables, command, drawn=drawn)
     return summary(tables, settings.out)
 
 
@@ -80,12 +88,33 @@ def cost(units: Sequence[Unit], store: Store, jobs: int) -> str:
     return "\n".join(lines)
 
 
+def draw(out: Path, drawings: Mapping[str, Drawing]) -> list[str]:
+    """Draw the figures of an exhibit and return the paths of their SVG files, relative to `out`.
+
+    Without matplotlib, which is optional, there are none; `summary` says so.
+    """
+    if not drawings or not can_draw():
+        return []
+    save_figures(out / FIGURES, drawings)
+    return [f"{FIGURES}/{name}.svg" for name in drawings]
+
+
+def can_draw() -> bool:
+    """Tell whether matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
 def write_pages(
-    out: Path, chosen: Mapping[str, Exhibit], tables: Mapping[str, Table], command: str
+    out: Path,
+    chosen: Mapping[str, Exhibit],
+    tables: Mapping[str, Table],
+    command: str,
+    *,
+    drawn: Mapping[str, Sequence[str]],
 ) -> None:
     """Write NAME.csv, NAME.parquet and NAME.md for every exhibit, and index.html over them.
 
-    Figures are written beside them where matplotlib is installed.
+    `drawn` has the figures of every exhibit, files beside the page.
     """
     sections = []
     for name, exhibit in chosen.items():
@@ -93,19 +122,10 @@ def write_pages(
         write_text(out / f"{name}.md", as_markdown(name, exhibit, table, command))
         if not table.not_run:
             write_rows(out, name, table.rows)
-        pictures = draw_figures(out, name, table) if can_draw() else {}
-        sections.append(as_html(name, exhibit, table, command, pictures))
+        figures = drawn.get(name, ())
+        sections.append(as_html(name, exhibit, table, command, figures=figures))
     title = "Tables and figures of Hussein & Begum (CoRL 2022)"
     write_text(out / "index.html", html_page(title, sections))
-
-
-def draw_figures(out: Path, name: str, table: Table) -> dict[str, str]:
-    """Write the figures of an exhibit, and return their paths in `out` by what they show."""
-    files = {
-        shows: "-".join([name, *re.findall(r"[a-z0-9]+", shows.lower())]) for shows in table.figures
-    }
-    save_figures(out, {files[shows]: drawing for shows, drawing in table.figures.items()})
-    return {shows: f"{file}.svg" for shows, file in files.items()}
 
 
 def summary(tables: Mapping[str, Table], out: Path) -> str:
@@ -115,7 +135,7 @@ def summary(tables: Mapping[str, Table], out: Path) -> str:
         lines.append(f"{name}:")
         lines += [f"  {sentence}" for sentence in (table.words or [f"not run: {table.not_run}"])]
     if not can_draw():
-        lines.append("No figures: they need matplotlib; run 'pip install teasim[figures]'.")
+        lines.append("figures: not drawn; they need 'pip install teasim[figures]'")
     return "\n".join([*lines, f"page: {out / 'index.html'}"])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from filtering.config import FilterConfig
 from filtering.demo_filter import DemoFilter
+from filtering.judging.evidence import Evidence
 from filtering.segmentation.config import FitConfig, MSTCNConfig
 from filtering.segmentation.fit import fit_segmenter
 from filtering.segmentation.metrics import (
@@ -24,19 +25,16 @@ from policies.experiments.generating import generate_pool
 from policies.experiments.reproduce.exhibits.policies import run_policies
 from policies.experiments.reproduce.exhibits.salads import judge_salads
 from policies.experiments.reproduce.methods import (
-    Answer,
     Question,
     judge_all,
     judge_thresholds,
     weigh_all,
 )
-from policies.experiments.reproduce.readings import Reading, read, read_bank
+from policies.experiments.reproduce.readings import describe, read_bank
 from policies.experiments.units import Result, Store, Unit, Work
 from teasim.common.errors import ConfigError
 from teasim.common.workers import Workers
 from teasim.pool import Pool
-from teasim.pool.source import Source
-from teasim.pool.views.part import Part
 
 
 def film(unit: Unit, store: Store, workers: Workers) -> Result:
@@ -98,40 +96,32 @@ def judge_pools(
     pool = Pool.open(store.folder_of(unit.needs["bank"]))
     judged = []
     for number, places in enumerate(drawn(pool, spec["kinds"], spec["row"], spec["pools"])):
-        reading, own = _reading(unit, store, pool, places)
+        evidence, alone = _look(unit, store, pool, places)
         kinds = np.repeat(range(len(spec["kinds"])), [count for _, count in spec["kinds"]])
         names = tuple(pool.episodes[place].demo_id for place in places)
-        ours = judge_videos(_part(pool, places), _segmenter(unit, store)) if spec["ours"] else None
-        judged.append(judge(Question(reading.evidence(own), kinds, names, number, ours)))
+        judged.append(judge(Question(evidence, kinds, names, alone, seed=number)))
     return {"pools": judged}
 
 
-def judge_videos(pool: Source, segmenter: str) -> Answer:
-    """Judge a pool as `teasim filter` does, with a segmenter of its own."""
-    found = DemoFilter(FilterConfig(segmenter=segmenter)).fit(pool)
-    return Answer(found.flagged_, found.losses_, found.probabilities_)
-
-
-def _segmenter(unit: Unit, store: Store) -> str:
-    """Return the segmenter of a unit: the folder of its network, or the name of one."""
-    needs = unit.needs
-    return str(store.folder_of(needs["network"]) if "network" in needs else unit.spec["segmenter"])
-
-
-def _reading(
+def _look(
     unit: Unit, store: Store, pool: Pool, places: Sequence[int]
-) -> tuple[Reading, Sequence[int]]:
-    """Return a reading and the places in it of the pool that was drawn."""
+) -> tuple[Evidence, DemoFilter | None]:
+    """Return the evidence about the demonstrations at `places`.
+
+    Without a network the segments are those that the default filter finds. The filter is returned
+    too, where it looked at the videos.
+    """
     frames = unit.spec["frames"]
     if "network" in unit.needs:
         network = store.folder_of(unit.needs["network"])
-        return read_bank(Path(pool.root).resolve(), network.resolve(), frames), places
-    return read(_part(pool, places), unit.spec["segmenter"], frames), range(len(places))
-
-
-def _part(pool: Pool, places: Sequence[int]) -> Part:
-    """Return a pool of some demonstrations of a bank, which is sound: it was made here."""
-    return Part(pool, [pool.episodes[place] for place in places])
+        reading = read_bank(Path(pool.root).resolve(), network.resolve(), frames)
+        fitted = None
+        if unit.spec["videos"]:
+            fitted = DemoFilter(FilterConfig(segmenter=str(network))).fit(pool.only(places))
+        return reading.evidence(places), fitted
+    part = pool.only(places)
+    fitted = DemoFilter().fit(part)
+    return describe(part, fitted.segments_, frames).evidence(range(len(places))), fitted
 
 
 def drawn(

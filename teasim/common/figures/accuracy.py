@@ -1,4 +1,4 @@
-"""Accuracy of policies over K, the number of incorrect demonstrations (paper, figure 6)."""
+"""Accuracy over K, the number of incorrect demonstrations (paper, figure 6), or another number."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,10 @@ from typing import Any
 from teasim.common.figures.colours import colours_of
 
 SHIFT = 0.08
-"""Distance between the intervals of series at the same K, so that they do not cover each other."""
+"""Distance between the intervals of series at the same K, so that they do not cover each other,
+where K spans WIDTH."""
+WIDTH = 7.0
+"""Span of K in the paper, from 1 to 8."""
 
 
 @dataclass(frozen=True)
@@ -15,7 +18,7 @@ class Point:
     """A measured share with its interval."""
 
     k: float
-    """Incorrect demonstrations in the pool, or what else the figure is drawn over."""
+    """Incorrect demonstrations in the pool, or what else the axis shows."""
     value: float
     """Share in [0, 1]."""
     low: float
@@ -32,8 +35,8 @@ class AccuracyFigure:
     """Points by name."""
     measure: str = "policy accuracy"
     """What is measured."""
-    across: str = "incorrect demonstrations K"
-    """What K is."""
+    over: str = "incorrect demonstrations K"
+    """What the horizontal axis shows."""
 
     @property
     def size(self) -> tuple[float, float]:
@@ -43,9 +46,11 @@ class AccuracyFigure:
     def draw(self, axes: Any) -> None:
         """Draw a line per series, with 95 % intervals."""
         colours = colours_of(list(self.series))
+        places = sorted({point.k for points in self.series.values() for point in points})
+        wide = (places[-1] - places[0]) / WIDTH if len(places) > 1 else 1.0
         for number, (name, points) in enumerate(self.series.items()):
             points = tuple(sorted(points, key=lambda point: point.k))
-            shift = SHIFT * (number - (len(self.series) - 1) / 2)
+            shift = SHIFT * wide * (number - (len(self.series) - 1) / 2)
             values = [100 * point.value for point in points]
             below = [100 * max(0.0, point.value - point.low) for point in points]
             above = [100 * max(0.0, point.high - point.value) for point in points]
@@ -61,7 +66,6 @@ class AccuracyFigure:
                 label=name,
             )
         axes.grid(axis="y")
-        places = {round(p.k, 1) for points in self.series.values() for p in points}
-        axes.set_xticks(sorted(int(k) if k == int(k) else k for k in places))
-        axes.set(xlabel=self.across, ylabel=f"{self.measure} [%]", ylim=(0, 103))
+        axes.set_xticks(places, [f"{place:.3g}" for place in places])
+        axes.set(xlabel=self.over, ylabel=f"{self.measure} [%]", ylim=(0, 103))
         axes.figure.legend(loc="outside upper center", ncols=min(3, len(self.series)))

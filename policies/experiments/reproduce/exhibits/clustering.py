@@ -1,7 +1,8 @@
 """Appendix E: detection against the quality of segmentation, and by the clustering of weights.
 
 The quality is not set: networks are fitted to fewer and fewer labelled videos, or to people, and
-their share of right frames is measured. Nothing is made worse by hand.
+their share of right frames is measured. Nothing is made worse by hand. The default filter stands
+beside them; it needs no network.
 """
 
 from dataclasses import replace
@@ -16,10 +17,10 @@ from policies.experiments.reproduce.exhibits.detecting import (
 )
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
 from policies.experiments.reproduce.exhibits.segmenting import frame_rate
-from policies.experiments.reproduce.methods import LEARNED, NORM, THRESHOLDS
-from policies.experiments.reproduce.plan import ROBOT_LEVEL, Plan
+from policies.experiments.reproduce.methods import LEARNED, NORM, OURS, THRESHOLDS
+from policies.experiments.reproduce.plan import ROBOT_LEVEL, UNLABELLED, Plan
 from policies.experiments.units import Store, Unit
-from teasim.common.figures import AccuracyFigure
+from teasim.common.figures import AccuracyFigure, Drawing
 from teasim.common.figures.accuracy import Point
 
 KINDS: dict[str, tuple[int, tuple[tuple[str, int], ...]]] = {
@@ -28,7 +29,9 @@ KINDS: dict[str, tuple[int, tuple[tuple[str, int], ...]]] = {
 }
 """Pools, with the number from which they are drawn."""
 METHODS = (NORM, LEARNED, *(f"equation 3, {name}" for name in THRESHOLDS))
-"""Methods of the work `thresholds`."""
+"""Methods of the work `thresholds` on the segments of a network."""
+RIGHT = "frames right [%]"
+"""Column of the quality of segmentation; empty for the default filter."""
 
 
 def networks(plan: Plan) -> dict[str, Unit]:
@@ -49,48 +52,73 @@ def pairs(plan: Plan) -> dict[tuple[str, str], tuple[Unit, Unit]]:
     return found
 
 
+def alone(plan: Plan) -> dict[str, Unit]:
+    """Return by pool the unit in which the default filter judges, without a network."""
+    return {
+        pool: pools_unit(plan, kinds, UNLABELLED, row=row, work="thresholds")
+        for pool, (row, kinds) in KINDS.items()
+    }
+
+
 def table(plan: Plan, store: Store) -> Table:
     """Return a row per network, pool and method, in the order of the right frames."""
     rows: list[dict[str, Any]] = []
-    points: dict[str, dict[str, list[Point]]] = {pool: {} for pool in KINDS}
     for (name, pool), (tested, judged) in pairs(plan).items():
-        right = frame_rate([store.read(tested)])
-        for method in METHODS:
-            scores = detection_scores(judged_by(judged, store, method))
-            accuracy = scores.accuracy
-            points[pool].setdefault(method, []).append(
-                Point(100 * right.value, accuracy.value, accuracy.low, accuracy.high)
-            )
-            rows.append(
-                {
-                    "network fitted to": name,
-                    "frames right [%]": round(100 * right.value, 1),
-                    "pool": pool,
-                    "method": method,
-                    "pools": scores.pools,
-                    **score_cells(scores),
-                    "accuracy [%]": round(100 * scores.accuracy.value, 1),
-                }
-            )
-    rows.sort(key=lambda row: row["frames right [%]"])
+        right = round(100 * frame_rate([store.read(tested)]).value, 1)
+        rows += [
+            {"network fitted to": name, RIGHT: right, **_judged(judged, store, pool, method)}
+            for method in METHODS
+        ]
+    rows.sort(key=lambda row: row[RIGHT])
     words = [_sentence(rows, method) for method in METHODS]
-    figures = {
-        pool: AccuracyFigure(
-            {method: tuple(found) for method, found in series.items()},
-            measure="demonstrations judged rightly",
-            across="frames segmented rightly [%]",
+    for pool, unit in alone(plan).items():
+        row = {"network fitted to": "none", RIGHT: None, **_judged(unit, store, pool, OURS)}
+        rows.append(row)
+        words.append(
+            f"{OURS}, from the videos alone: accuracy {row['accuracy']} % in {row['pools']} pools "
+            f"of {pool}."
         )
-        for pool, series in points.items()
+    return Table(rows, words, notes=(INTERVALS,))
+
+
+def _judged(unit: Unit, store: Store, pool: str, method: str) -> dict[str, Any]:
+    """Return what a row says about a method."""
+    scores = detection_scores(judged_by(unit, store, method))
+    return {
+        "pool": pool,
+        "method": method,
+        "pools": scores.pools,
+        **score_cells(scores),
+        "accuracy [%]": round(100 * scores.accuracy.value, 1),
     }
-    return Table(rows, words, notes=(INTERVALS,), figures=figures)
+
+
+def figures(plan: Plan, store: Store) -> dict[str, Drawing]:
+    """Return the accuracy of detection over the right frames, a figure per pool."""
+    drawn: dict[str, Drawing] = {}
+    for number, pool in enumerate(KINDS):
+        series: dict[str, list[Point]] = {method: [] for method in METHODS}
+        for (_, one), (tested, judged) in pairs(plan).items():
+            if one != pool:
+                continue
+            right = 100 * frame_rate([store.read(tested)]).value
+            for method in METHODS:
+                rate = detection_scores(judged_by(judged, store, method)).accuracy
+                series[method].append(Point(right, rate.value, rate.low, rate.high))
+        drawn[f"appendix-e-{number + 1}"] = AccuracyFigure(
+            {method: tuple(points) for method, points in series.items()},
+            f"accuracy of detection, {pool},",
+            "frames right [%]",
+        )
+    return drawn
 
 
 def _sentence(rows: list[dict[str, Any]], method: str) -> str:
     mine = [row for row in rows if row["method"] == method]
-    worst, best = mine[0]["frames right [%]"], mine[-1]["frames right [%]"]
+    worst, best = mine[0][RIGHT], mine[-1][RIGHT]
 
     def mean(level: float) -> float:
-        found = [row["accuracy [%]"] for row in mine if row["frames right [%]"] == level]
+        found = [row["accuracy [%]"] for row in mine if row[RIGHT] == level]
         return sum(found) / len(found)
 
     return (
@@ -103,6 +131,7 @@ APPENDIX_E = Exhibit(
     "detection by the quality of segmentation and the clustering of weights",
     "compares qualities of segmentation, and k-means, a Gaussian mixture and mini-batch k-means; "
     "the numbers are in an appendix that was not available.",
-    lambda plan: [unit for pair in pairs(plan).values() for unit in pair],
+    lambda plan: [*(unit for pair in pairs(plan).values() for unit in pair), *alone(plan).values()],
     table,
+    figures,
 )

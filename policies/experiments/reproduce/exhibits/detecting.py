@@ -6,7 +6,7 @@ from typing import Any
 
 from policies.experiments.detection import DetectionScores, Judged, detection_scores
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
-from policies.experiments.reproduce.methods import OURS
+from policies.experiments.reproduce.methods import METHODS, NORM, OURS
 from policies.experiments.reproduce.paper import (
     CORRECT,
     DETECTION,
@@ -24,10 +24,20 @@ from policies.experiments.reproduce.plan import (
     Plan,
 )
 from policies.experiments.units import Store, Unit
+from teasim.common.figures import AccuracyFigure, Drawing
+from teasim.common.figures.accuracy import Point
 from teasim.common.statistics import Rate
 
 OTHERS: Mapping[str, str] = MappingProxyType({"table2": "seq_2", "table3": "seq_3"})
 """The other demonstrations of each table."""
+COMPARED: Mapping[tuple[str, str], str] = MappingProxyType(
+    {
+        (OURS, UNLABELLED): "ours, from the videos alone",
+        (OURS, PEOPLE_LEVEL): "with a network at the paper's level of segmentation",
+        (NORM, PEOPLE_LEVEL): "norm at the paper's level of segmentation",
+    }
+)
+"""Methods and segmenters that are compared with the paper's numbers, and how that is called."""
 INTERVALS = (
     "Rates are in % with 95 % intervals, the wider one of two: with each pool, and with each "
     "demonstration of the bank, as a group of correlated trials. Length and random are told how "
@@ -51,16 +61,16 @@ def pools_unit(
     size = plan.size
     pools = size.clustered if segmenter == UNLABELLED else size.pools
     each = SECONDS_PER_CLUSTERED if segmenter == UNLABELLED else SECONDS_PER_POOL
-    whole = work == "detection" and segmenter != ROBOT_LEVEL
     spec = {
         "kinds": [list(kind) for kind in kinds],
         "segmenter": segmenter,
         "row": 1000 * plan.seed + row,
         "pools": pools,
         "frames": size.frames,
-        "ours": whole,
+        "videos": by_videos(segmenter, work),
     }
-    each += whole * SECONDS_PER_FILTERED
+    if spec["videos"] and segmenter != UNLABELLED:
+        each += SECONDS_PER_FILTERED
     needs = {"bank": plan.bank("robot"), **plan.segmenter(segmenter)}
     return Unit(work, spec, needs, pools * each)
 
@@ -68,11 +78,6 @@ def pools_unit(
 def judged_by(unit: Unit, store: Store, method: str) -> list[Judged]:
     """Return what a method said about the pools of a unit that is done."""
     return [Judged.from_json(pool[method]) for pool in store.read(unit)["pools"]]
-
-
-def methods_of(unit: Unit, store: Store) -> list[str]:
-    """Return the methods that judged the pools of a unit that is done."""
-    return list(store.read(unit)["pools"][0])
 
 
 def percent(rate: Rate) -> str:
@@ -128,13 +133,26 @@ def segmenters(plan: Plan, k: int) -> list[str]:
     return [name for name in SEGMENTERS if name != UNLABELLED or k in plan.size.unlabelled]
 
 
+def methods(segmenter: str) -> list[str]:
+    """Return the methods of a segmenter; videos are looked at where `by_videos` says so."""
+    return [OURS, *METHODS] if by_videos(segmenter, "detection") else list(METHODS)
+
+
+def by_videos(segmenter: str, work: str) -> bool:
+    """Return whether the default filter judges too: without labels, or at the paper's level.
+
+    With a network of our level the sub-tasks alone tell what is to be told.
+    """
+    return segmenter == UNLABELLED or (segmenter == PEOPLE_LEVEL and work == "detection")
+
+
 def table(plan: Plan, store: Store, name: str) -> Table:
     """Return all rows of a table: k x segmenter x method."""
     rows, words = [], [precision_sentence()]
     for number, printed in enumerate(DETECTION[name]):
         for segmenter in segmenters(plan, printed.k):
             unit = _unit(plan, name, number, segmenter)
-            for method in methods_of(unit, store):
+            for method in methods(segmenter):
                 scores = detection_scores(judged_by(unit, store, method))
                 rows.append(
                     {
@@ -149,10 +167,32 @@ def table(plan: Plan, store: Store, name: str) -> Table:
                         "paper F1 (printed as precision)": printed.precision,
                     }
                 )
-                if method == OURS and segmenter == PEOPLE_LEVEL:
-                    what = f"{CORRECT} + {printed.k} at the paper's level of segmentation"
+                if (method, segmenter) in COMPARED:
+                    what = f"{CORRECT} + {printed.k}, {COMPARED[method, segmenter]}"
                     words.append(against(what, scores, printed))
     return Table(rows, words, notes=(INTERVALS,))
+
+
+def figures(plan: Plan, store: Store, name: str) -> dict[str, Drawing]:
+    """Return the accuracy over k: of the default filter, of fitted segmenters, and baselines."""
+    shown = {"ours, from videos alone": (OURS, UNLABELLED)}
+    shown |= {f"norm, {SEGMENTERS[s]}": (NORM, s) for s in (PEOPLE_LEVEL, ROBOT_LEVEL)}
+    shown |= {f"{method}, told k": (method, PEOPLE_LEVEL) for method in ("length", "random")}
+    series: dict[str, tuple[Point, ...]] = {}
+    for title, (method, segmenter) in shown.items():
+        points = []
+        for number, printed in enumerate(DETECTION[name]):
+            if segmenter in segmenters(plan, printed.k):
+                judged = judged_by(_unit(plan, name, number, segmenter), store, method)
+                points.append(_point(printed.k, detection_scores(judged).accuracy))
+        series[title] = tuple(points)
+    paper = [(row.k, row.accuracy / 100) for row in DETECTION[name]]
+    series["the paper, one pool"] = tuple(Point(k, share, share, share) for k, share in paper)
+    return {name: AccuracyFigure(series, "accuracy of detection")}
+
+
+def _point(k: int, rate: Rate) -> Point:
+    return Point(k, rate.value, rate.low, rate.high)
 
 
 def _unit(plan: Plan, name: str, number: int, segmenter: str) -> Unit:
@@ -168,6 +208,7 @@ def exhibit(name: str, title: str, paper: str) -> Exhibit:
         paper,
         lambda plan: units(plan, name),
         lambda plan, store: table(plan, store, name),
+        lambda plan, store: figures(plan, store, name),
     )
 
 

@@ -1,8 +1,9 @@
 """What a table or figure of the paper becomes here: units of work, then rows and sentences."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 from policies.experiments.reproduce.plan import Plan
 from policies.experiments.tabular import Rows, html_table, markdown_table
@@ -22,13 +23,17 @@ class Table:
     """Why nothing was run; empty where something was."""
     notes: Sequence[str] = ()
     """How the numbers are to be read."""
-    figures: Mapping[str, Drawing] = field(default_factory=dict)
-    """Its figures; the name of each is added to that of the exhibit."""
 
     @property
     def columns(self) -> list[str]:
         """Names of the columns."""
         return list(self.rows[0]) if self.rows else []
+
+
+def no_figures(plan: Plan, store: Store) -> Mapping[str, Drawing]:
+    """Draw nothing."""
+    del plan, store
+    return {}
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,8 @@ class Exhibit:
     """Returns the work it is made from."""
     table: Callable[[Plan, Store], Table]
     """Returns the table, when all units are done."""
+    figures: Callable[[Plan, Store], Mapping[str, Drawing]] = no_figures
+    """Returns figures by file name, when all units are done."""
 
 
 def as_markdown(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
@@ -55,19 +62,19 @@ def as_markdown(name: str, exhibit: Exhibit, table: Table, command: str) -> str:
 
 
 def as_html(
-    name: str, exhibit: Exhibit, table: Table, command: str, pictures: Mapping[str, str]
+    name: str, exhibit: Exhibit, table: Table, command: str, *, figures: Sequence[str] = ()
 ) -> str:
-    """Write the same section as HTML, with the paths of its figures by what they show."""
+    """Write the same section as HTML, with the `figures` that are drawn, files beside the page."""
     head = f"<section id='{escape(name)}'><h2>{escape(name)}: {escape(exhibit.title)}</h2>"
     parts = [head, f"<pre>{escape(command)}</pre>", f"<p>The paper: {escape(exhibit.paper)}</p>"]
     if table.not_run:
         return "\n".join([*parts, f"<p>Not run: {escape(table.not_run)}</p></section>"])
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in table.words)
     notes = "".join(f"<p>{escape(note)}</p>" for note in table.notes)
-    drawn = "".join(
-        f'<figure><img src="{escape(path)}" alt="{escape(shows)}">'
-        f"<figcaption>{escape(shows)}</figcaption></figure>"
-        for shows, path in pictures.items()
+    pictures = "".join(
+        f"<figure><img src='{escape(path)}' alt='{escape(Path(path).stem)}' loading='lazy'>"
+        f"<figcaption>{escape(Path(path).stem)}</figcaption></figure>"
+        for path in figures
     )
-    body = [f"<ul>{items}</ul>", drawn, html_table(table.rows), notes, "</section>"]
-    return "\n".join([*parts, *body])
+    parts += [f"<ul>{items}</ul>", pictures, html_table(table.rows), notes]
+    return "\n".join([*parts, "</section>"])

@@ -101,7 +101,7 @@ def judge_salads(unit: Unit, store: Store, workers: Workers) -> Result:
     for number, pool in enumerate(draw_salads(salads, spec["k"], spec["pools"], spec["row"])):
         kinds = np.array([int(salad.dressing_first) for salad in pool])
         names = tuple(salad.name for salad in pool)
-        judged.append(judge_all(Question(_evidence(folder, pool), kinds, names, number)))
+        judged.append(judge_all(Question(_evidence(folder, pool), kinds, names, seed=number)))
     return {"pools": judged}
 
 
@@ -167,7 +167,7 @@ def table(plan: Plan, store: Store) -> Table:
                     "paper accuracy": printed[k].accuracy,
                 }
             )
-            if method == NORM:
+            if method == NORM:  # what the default filter does where there are no videos
                 words.append(against(f"{CORRECT} + {k}, {steps}", scores, printed[k]))
     return Table(rows, words, notes=(INTERVALS,))
 

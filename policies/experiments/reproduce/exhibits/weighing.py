@@ -5,9 +5,9 @@ from typing import Any
 
 from policies.experiments.reproduce.exhibits.detecting import percent, pools_unit
 from policies.experiments.reproduce.exhibits.exhibit import Exhibit, Table
-from policies.experiments.reproduce.plan import PEOPLE_LEVEL, ROBOT_LEVEL, SEGMENTERS, Plan
+from policies.experiments.reproduce.plan import SEGMENTERS, Plan
 from policies.experiments.units import Store, Unit
-from teasim.common.figures import WeightsFigure
+from teasim.common.figures import Drawing, WeightsFigure
 from teasim.common.statistics import Rate, rate
 
 FIGURES: dict[str, tuple[int, tuple[tuple[str, int], ...]]] = {
@@ -15,34 +15,31 @@ FIGURES: dict[str, tuple[int, tuple[tuple[str, int], ...]]] = {
     "figure5": (201, (("seq_1", 6), ("seq_2", 4), ("seq_3", 2))),
 }
 """Number from which the pools are drawn, and the paper's composition of the pool."""
-LEVELS = (PEOPLE_LEVEL, ROBOT_LEVEL)
-"""Segmenters whose weights are shown."""
 
 
 def units(plan: Plan, name: str) -> dict[str, Unit]:
     """Return the unit of each segmenter."""
     row, kinds = FIGURES[name]
-    return {level: pools_unit(plan, kinds, level, row=row, work="weights") for level in LEVELS}
+    return {one: pools_unit(plan, kinds, one, row=row, work="weights") for one in SEGMENTERS}
 
 
 def table(plan: Plan, store: Store, name: str) -> Table:
     """Return a row per demonstration of the first pool, and how often the groups are right."""
     _, kinds = FIGURES[name]
     rows: list[dict[str, Any]] = []
-    words, figures = [], {}
-    for level, unit in units(plan, name).items():
-        pools = store.read(unit)["pools"]
-        rows += _rows(SEGMENTERS[level], [kind for kind, _ in kinds], pools[0])
+    words = []
+    found = {level: store.read(unit)["pools"] for level, unit in units(plan, name).items()}
+    methods = list(dict.fromkeys(m for pools in found.values() for m in pools[0]["methods"]))
+    for level, pools in found.items():
+        rows += _rows(SEGMENTERS[level], [kind for kind, _ in kinds], pools[0], methods)
         for method in pools[0]["methods"]:
             right = exactly_right(pools, method)
             words.append(
                 f"{SEGMENTERS[level]}, {method}, told {len(kinds)} groups: exactly the true groups "
                 f"in {right.hits} of {right.trials} pools ({percent(right)} %)."
             )
-            shows = f"{SEGMENTERS[level]}, {method}"
-            figures[shows] = _figure([kind for kind, _ in kinds], pools[0], method)
     note = "The rows are the first pool; pools share demonstrations of one bank."
-    return Table(rows, words, notes=(note,), figures=figures)
+    return Table(rows, words, notes=(note,))
 
 
 def exactly_right(pools: Sequence[dict[str, Any]], method: str) -> Rate:
@@ -50,28 +47,37 @@ def exactly_right(pools: Sequence[dict[str, Any]], method: str) -> Rate:
     return rate(sum(p["methods"][method]["groups"] == p["kinds"] for p in pools), len(pools))
 
 
-def _figure(kinds: Sequence[str], pool: dict[str, Any], method: str) -> WeightsFigure:
-    """Draw the weights of a pool; marked are those in another group than the best."""
-    said = pool["methods"][method]
-    return WeightsFigure(
-        tuple(said["weights"]),
-        tuple(group > 0 for group in said["groups"]),
-        tuple(kinds[kind] for kind in pool["kinds"]),
-        threshold=0.0,  # there are several groups
-    )
-
-
-def _rows(segmenter: str, kinds: Sequence[str], pool: dict[str, Any]) -> list[dict[str, Any]]:
+def _rows(
+    segmenter: str, kinds: Sequence[str], pool: dict[str, Any], methods: Sequence[str]
+) -> list[dict[str, Any]]:
+    said = pool["methods"]
     return [
         {
             "segmenter": segmenter,
             "demonstration": place,
             "sequence": kinds[pool["kinds"][place]],
-            **{f"w, {m}": said["weights"][place] for m, said in pool["methods"].items()},
-            **{f"group, {m}": said["groups"][place] for m, said in pool["methods"].items()},
+            **{f"w, {m}": said[m]["weights"][place] if m in said else None for m in methods},
+            **{f"group, {m}": said[m]["groups"][place] if m in said else None for m in methods},
         }
         for place in range(len(pool["kinds"]))
     ]
+
+
+def figures(plan: Plan, store: Store, name: str) -> dict[str, Drawing]:
+    """Return the weights of the first pool by every segmenter and method."""
+    kinds = [kind for kind, _ in FIGURES[name][1]]
+    drawn: dict[str, Drawing] = {}
+    for level, unit in units(plan, name).items():
+        pool = store.read(unit)["pools"][0]
+        for method, said in pool["methods"].items():
+            title = f"{name}-{level}-{method}".replace(", ", "-").replace(" ", "-")
+            drawn[title] = WeightsFigure(
+                tuple(said["weights"]),
+                tuple(group > 0 for group in said["groups"]),
+                tuple(kinds[kind] for kind in pool["kinds"]),
+                0.0,
+            )
+    return drawn
 
 
 def exhibit(name: str, title: str, paper: str) -> Exhibit:
@@ -81,6 +87,7 @@ def exhibit(name: str, title: str, paper: str) -> Exhibit:
         paper,
         lambda plan: list(units(plan, name).values()),
         lambda plan, store: table(plan, store, name),
+        lambda plan, store: figures(plan, store, name),
     )
 
 
