@@ -66,7 +66,7 @@ def picture_maps(pixels: Mapping[str, NDArray[np.uint8]], cameras: tuple[str, ..
 
 @lru_cache(maxsize=REMEMBERED)
 def _remembered(picture: bytes, shape: tuple[int, ...]) -> Maps:
-    frame = np.frombuffer(picture, dtype=np.uint8).reshape(shape)
+    frame = np.frombuffer(picture, dtype=np.uint8).reshape(shape).copy()
     return camera_maps({"": frame[None]}, ("",))[:, 0]
 
 
