@@ -197,18 +197,16 @@ def _judged(
     _, each = judge(values, count)
     exceeded = most_telling(each)
     chosen = {kind: telling([one[kind] for one in each]) for kind in KINDS}
-    findings = []
-    for d in range(len(next(iter(exceeded.values())))):
-        said = []
-        for kind in KINDS:
-            camera, z = cameras[chosen[kind][d]], float(exceeded[kind][d])
-            one = evidence[camera][kind]
-            said.append(MomentFinding(kind, camera, one.own[d], one.other[d], z))
-        findings.append(_in_order(said))
+
+    def finding(kind: str, d: int) -> MomentFinding:
+        camera = cameras[chosen[kind][d]]
+        one = evidence[camera][kind]
+        return MomentFinding(kind, camera, one.own[d], one.other[d], float(exceeded[kind][d]))
+
     return MomentScore(
         strengths_of(exceeded),
         exceeded,
-        tuple(findings),
+        tuple(_in_order([finding(kind, d) for kind in KINDS]) for d in range(count)),
         found,
         structure,
         kept=np.median(kept, axis=0),
