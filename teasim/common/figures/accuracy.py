@@ -11,6 +11,10 @@ SHIFT = 0.08
 where K spans WIDTH."""
 WIDTH = 7.0
 """Span of K in the paper, from 1 to 8."""
+LEGEND = 84
+"""Characters that fit side by side in the legend."""
+MARK = 7
+"""Characters that the mark before a name takes."""
 
 
 @dataclass(frozen=True)
@@ -68,4 +72,6 @@ class AccuracyFigure:
         axes.grid(axis="y")
         axes.set_xticks(places, [f"{place:.3g}" for place in places])
         axes.set(xlabel=self.over, ylabel=f"{self.measure} [%]", ylim=(0, 103))
-        axes.figure.legend(loc="outside upper center", ncols=min(3, len(self.series)))
+        longest = max(map(len, self.series), default=0)
+        columns = max(1, min(3, len(self.series), LEGEND // (longest + MARK)))
+        axes.figure.legend(loc="outside upper center", ncols=columns)

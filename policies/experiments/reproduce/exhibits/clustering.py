@@ -75,8 +75,8 @@ def table(plan: Plan, store: Store) -> Table:
         row = {"network fitted to": "none", RIGHT: None, **_judged(unit, store, pool, OURS)}
         rows.append(row)
         words.append(
-            f"{OURS}, from the videos alone: accuracy {row['accuracy']} % in {row['pools']} pools "
-            f"of {pool}."
+            f"{OURS}, from the videos alone: accuracy {row['accuracy']} % over {row['pools']} "
+            f"pool(s) of {pool}."
         )
     return Table(rows, words, notes=(INTERVALS,))
 
@@ -107,8 +107,8 @@ def figures(plan: Plan, store: Store) -> dict[str, Drawing]:
                 series[method].append(Point(right, rate.value, rate.low, rate.high))
         drawn[f"appendix-e-{number + 1}"] = AccuracyFigure(
             {method: tuple(points) for method, points in series.items()},
-            f"accuracy of detection, {pool},",
-            "frames right [%]",
+            "accuracy of detection",
+            f"frames right [%], pools of {pool}",
         )
     return drawn
 

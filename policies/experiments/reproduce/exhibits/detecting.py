@@ -112,7 +112,7 @@ def against(what: str, scores: DetectionScores, printed: PaperRow) -> str:
     else:
         verdict = "not told apart from the paper's"
     return (
-        f"{what}: accuracy {percent(rate)} % over {scores.pools} pools, {verdict} "
+        f"{what}: accuracy {percent(rate)} % over {scores.pools} pool(s), {verdict} "
         f"{printed.accuracy} % of one pool; {scores.false_positives / scores.pools:.2f} correct "
         f"demonstrations accused per pool (the paper {printed.false_positives}), recall "
         f"{percent(scores.recall)} % (the paper 100 %)."

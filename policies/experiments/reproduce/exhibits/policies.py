@@ -21,7 +21,7 @@ from policies.experiments.reproduce.plan import (
     SECONDS_PER_DEMO,
     SECONDS_PER_EPISODE,
     SECONDS_PER_PICTURED,
-    SECONDS_PER_VIDEO,
+    SECONDS_PER_WATCHED,
     Plan,
 )
 from policies.experiments.units import Result, Store, Unit
@@ -68,7 +68,7 @@ def _unit(plan: Plan, k: int, seen: str) -> Unit:
     seconds = policies * len(MODES) * size.episodes * SECONDS_PER_EPISODE / 2
     needs = {"bank": _bank(plan, k)}
     if seen == PICTURES:
-        seconds += (CORRECT + k) * SECONDS_PER_VIDEO + policies * SECONDS_PER_PICTURED
+        seconds += (CORRECT + k) * SECONDS_PER_WATCHED + policies * SECONDS_PER_PICTURED
     else:
         needs["filtered"] = _unit(plan, k, PICTURES)
     return Unit("policies", spec, needs, seconds, wide=True)
