@@ -8,9 +8,10 @@ const element = (id) => document.getElementById(id);
 const key = "teasim " + Object.values(data.rows).map((row) => row[0]).sort().join("").slice(0, 400) + demos.length;
 
 // Verdicts and names survive a reload, where the browser lets a page keep something.
-const kept = (() => {
+const stored = () => {
   try { return { verdicts: {}, names: {}, ...JSON.parse(localStorage.getItem(key) || "{}") }; } catch { return { verdicts: {}, names: {} }; }
-})();
+};
+const kept = stored();
 const keep = () => { try { localStorage.setItem(key, JSON.stringify(kept)); } catch { /* only this visit */ } };
 
 // Videos are loaded when they are asked for, and one plays at a time.
@@ -160,9 +161,9 @@ function rename() {
   texts.clear();
   element("save-names").disabled = !Object.keys(kept.names).length;
 }
-for (const input of document.querySelectorAll("[data-step]")) {
+const inputs = [...document.querySelectorAll("[data-step]")];
+for (const input of inputs) {
   const [name] = data.subtasks[input.dataset.step];
-  input.value = kept.names[name] || "";
   input.addEventListener("change", () => {
     const typed = input.value.trim();
     if (typed) kept.names[name] = typed; else delete kept.names[name];
@@ -215,9 +216,16 @@ function arrive() { // a link to a video that is filtered away shows all
 }
 addEventListener("hashchange", arrive);
 
-for (const demo of demos) if (kept.verdicts[demo.dataset.index]) tell(demo);
-if (Object.keys(kept.names).length) rename();
-count();
+function recall() {
+  for (const demo of demos) tell(demo);
+  for (const input of inputs) input.value = kept.names[data.subtasks[input.dataset.step][0]] || "";
+  if (firstTexts.size || Object.keys(kept.names).length) rename();
+  count();
+}
+recall();
+addEventListener("storage", (event) => { // the page in another tab kept something
+  if (event.key === key || event.key === null) { Object.assign(kept, stored()); recall(); }
+});
 filter(); // a browser may have kept what was typed before a reload
 arrive();
 document.documentElement.dataset.ready = Math.round(performance.now());

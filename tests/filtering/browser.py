@@ -31,7 +31,7 @@ def find_chromium() -> str | None:
 
 
 class Browser:
-    """A browser with one tab."""
+    """A browser with one tab, unless another one is asked for."""
 
     def __init__(self, process: subprocess.Popen[bytes], read: int, write: int) -> None:
         self._process, self._read, self._write = process, read, write
@@ -48,14 +48,33 @@ class Browser:
         processes later that it was cleared.
         """
         former, self._session = self._context, None
-        context = self.send("Target.createBrowserContext")["browserContextId"]
-        target = self.send("Target.createTarget", url="about:blank", browserContextId=context)
+        self._context = self.send("Target.createBrowserContext")["browserContextId"]
+        self._new_tab()
         if former:
+            session, self._session = self._session, None
             self.send("Target.disposeBrowserContext", browserContextId=former)
-        attached = self.send("Target.attachToTarget", targetId=target["targetId"], flatten=True)
-        self._context, self._session = context, attached["sessionId"]
+            self._session = session
+
+    @contextmanager
+    def other_tab(self) -> Iterator[None]:
+        """Go on in a second tab beside the first; it is closed with the block."""
+        first, self._session = self._session, None
+        target = self._new_tab()
+        try:
+            yield
+        finally:
+            self._session = None
+            self.send("Target.closeTarget", targetId=target)
+            self._session = first
+
+    def _new_tab(self) -> str:
+        context = {"browserContextId": self._context}
+        target = str(self.send("Target.createTarget", url="about:blank", **context)["targetId"])
+        attached = self.send("Target.attachToTarget", targetId=target, flatten=True)
+        self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.send(f"{domain}.enable")
+        return target
 
     def send(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Call a method of the protocol."""
@@ -80,10 +99,12 @@ class Browser:
         self._drawn()
 
     def reload(self) -> None:
-        """Load the page again in its process, which knows what the page has stored.
+        """Load the page again, no sooner than a person would.
 
-        Another process may read the store before the write of the first one has reached it.
+        Chromium hands what a page stores to another process. A page that is loaded at once may
+        read the store before that: wait for what it is to show.
         """
+        self.run("new Promise(later => setTimeout(later, 500))")
         self.run("delete document.documentElement.dataset.ready")
         self.send("Page.reload")
         self._drawn()

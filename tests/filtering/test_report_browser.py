@@ -20,6 +20,7 @@ LARGEST_PAGE = 20_000_000
 """A page of 300 videos is smaller [bytes]."""
 SOON = 2.0
 """A page of 300 videos is ready after this processor time of the browser [s]."""
+JUDGED = "document.getElementById('judged').textContent"
 CONTRAST = (Path(__file__).parent / "contrast.js").read_text()
 
 
@@ -143,9 +144,9 @@ def test_verdicts_become_a_weight_table(page: Browser, tmp_path: Path) -> None:
     click(page, "#demo-0 [data-says=incorrect]")  # overruled
     click(page, "#demo-1 [data-says=correct]")
     click(page, "#demo-1 [data-says=correct]")  # taken back
-    assert page.run("document.getElementById('judged').textContent") == "1 confirmed, 2 overruled."
+    assert page.run(JUDGED) == "1 confirmed, 2 overruled."
     page.reload()  # they survive it
-    assert page.run("document.getElementById('judged').textContent") == "1 confirmed, 2 overruled."
+    page.wait(f"{JUDGED} === '1 confirmed, 2 overruled.'")
     click(page, "#save-weights")
     rows = read_weight_table(downloaded(page, tmp_path, "weights.csv"))
     assert rows[1] == row_of(told[1])
@@ -158,6 +159,22 @@ def test_verdicts_become_a_weight_table(page: Browser, tmp_path: Path) -> None:
     assert rows[9].reason == told[9].reason
     choose(page, "show", "open")
     assert sorted(set(range(15)) - set(order(page))) == [0, 4, 9]
+
+
+def test_verdicts_and_names_reach_the_page_in_another_tab(page: Browser, small: Path) -> None:
+    name = f"name-{STEPS.index('turn_on')}"
+    with page.other_tab():
+        page.open(small)
+        click(page, "#demo-9 [data-says=incorrect]")
+        choose(page, name, "light")
+    page.wait(f"{JUDGED} === '1 confirmed, 0 overruled.'")
+    page.wait(f"document.getElementById('{name}').value === 'light'")
+    click(page, "#demo-0 [data-says=incorrect]")  # which takes nothing back
+    with page.other_tab():
+        page.open(small)
+        page.wait(f"{JUDGED} === '1 confirmed, 1 overruled.'")
+        assert page.run(f"document.getElementById('{name}').value") == "light"
+    assert page.errors == []
 
 
 def row_of(demo) -> WeightRow:
