@@ -9,11 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import ROUND_TRIP, Counterparts, returned
+from filtering.moments.counterparts import Counterparts, placed
 
 
 def confirmation(found: Counterparts, labels: Sequence[NDArray[np.int64]]) -> float:
-    """Return Cohen's kappa of the sub-tasks of counterparts that return: 1 if they always agree.
+    """Return Cohen's kappa of the sub-tasks of counterparts: 1 if they always agree.
+
+    Only counterparts that return, and have places of their own, are compared.
 
     Args:
         found: the counterparts.
@@ -24,7 +26,7 @@ def confirmation(found: Counterparts, labels: Sequence[NDArray[np.int64]]) -> fl
         for d, (there, back) in enumerate(zip(row, rows_back, strict=True)):
             if there is None or back is None:
                 continue
-            mutual = returned(there, back, ROUND_TRIP)
+            mutual = placed(there, back)
             pairs.append(np.stack([labels[r][mutual], labels[d][there.at[mutual]]]))
     one, other = np.concatenate(pairs, axis=1) + 1
     if not len(one):

@@ -139,8 +139,9 @@ def by_length(chooser: Chooser, variant: FilterVariant) -> Sequence[WeightRow]:
 
 
 def by_chance(chooser: Chooser, variant: FilterVariant) -> Sequence[WeightRow]:
-    """Flag demonstrations at random."""
-    losses = np.random.default_rng(variant.seed).random(len(chooser.pool.episodes))
+    """Flag demonstrations at random, others in every pool of a plan."""
+    rng = np.random.default_rng([variant.seed, *chooser.name.encode()])
+    losses = rng.random(len(chooser.pool.episodes))
     flagged = told_how_many(losses, _count(chooser, variant))
     return _rows(chooser.pool, flagged, losses, "Drawn at random.")
 

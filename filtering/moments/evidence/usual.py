@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, returned
+from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, placed
 from filtering.moments.evidence.peers import Peers
 from filtering.moments.evidence.stretches import worst
 
@@ -18,6 +18,8 @@ RECOGNISED = 1.2
 done at another place is done among other things."""
 
 
+LEAST_SURE = 0.5
+"""Least share of a video that moments are taken to pass a share of: a few sure ones tell little."""
 FEWEST = 2
 """Least number of videos that say what is usual, beside a reference and who is judged."""
 
@@ -39,7 +41,7 @@ def rows_of(found: Counterparts, peers: Peers) -> list[int]:
 
 
 def moved(at: NDArray[np.int64], sure: NDArray[np.bool_]) -> Array:
-    """Return (n,): the share of a video that each moment has passed in the other video.
+    """Return (n,): the share of the moments that each moment has passed in the other video.
 
     That are the moments that came before it and come after it in the other, or the other way round.
     Tempo, rests and what is left out elsewhere change nothing about it.
@@ -53,7 +55,7 @@ def moved(at: NDArray[np.int64], sure: NDArray[np.bool_]) -> Array:
     later = at[:, None] > at[None, :] + ROUND_TRIP
     passed = (earlier & later & sure[:, None]).sum(axis=0)
     passing = (earlier & later & sure[None, :]).sum(axis=1)
-    return np.where(sure, (passed + passing) / len(at), 0.0)
+    return np.where(sure, (passed + passing) / max(sure.sum(), LEAST_SURE * len(at)), 0.0)
 
 
 def usual_of(curves: NDArray[np.floating]) -> Array:
@@ -133,7 +135,7 @@ class Reference:
             match, back = self._match(d), self._back[d]
             assert back is not None
             near = match.contested - self._median < RECOGNISED
-            self._known[d] = moved(match.at, near & returned(match, back, ROUND_TRIP))
+            self._known[d] = moved(match.at, near & placed(match, back))
         return self._known[d]
 
     def _match(self, d: int) -> Match:

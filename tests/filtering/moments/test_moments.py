@@ -9,6 +9,7 @@ from filtering.moments.counterparts import (
     compare,
     find_counterparts,
     find_match,
+    recurring,
 )
 from filtering.moments.decision import KINDS, Observed, exceedances, judge
 from filtering.moments.evidence.effects import states_of, usual_change
@@ -25,6 +26,11 @@ from tests.filtering.moments.toy_videos import LENGTH, STEPS, toy_video, usual_v
 
 MISSING = [0, 1, 3, 4]
 SWAPPED = [0, 3, 1, 2, 4]
+
+
+def unique(count):
+    """Return which of some moments recur: none."""
+    return np.zeros(count, dtype=np.bool_)
 
 
 def judged(videos):
@@ -67,7 +73,7 @@ def test_a_place_belongs_to_the_moment_that_fits_it_best():
     distances = np.full((40, 20), 8.0, dtype=np.float32)
     distances[np.arange(20), np.arange(20)] = 1.0
     distances[np.arange(20, 40), np.arange(20)] = 2.0
-    found = find_match(distances)
+    found = find_match(distances, unique(40), unique(20))
     assert np.array_equal(found.nearest, np.tile(np.arange(20), 2))
     assert np.allclose(found.near[20:], np.log(2.0), atol=1e-5)
     assert np.allclose(found.contested[:20], 0.0, atol=1e-5)
@@ -77,8 +83,38 @@ def test_a_place_belongs_to_the_moment_that_fits_it_best():
 def test_moments_close_by_do_not_contest_a_place():
     distances = np.full((APART + 1, 1), 2.0, dtype=np.float32)
     distances[0] = 1.0
-    found = find_match(distances)
+    found = find_match(distances, unique(APART + 1), unique(1))
     assert np.array_equal(found.contested, found.near)
+
+
+def test_a_moment_recurs_where_it_or_its_counterpart_does():
+    distances = np.where(np.eye(9, dtype=bool), 1.0, 8.0).astype(np.float32)
+    own, other = unique(9), unique(9)
+    own[2], other[5] = True, True
+    assert np.flatnonzero(find_match(distances, own, other).recurs).tolist() == [2, 5]
+
+
+def test_what_a_video_shows_twice_recurs():
+    rng = np.random.default_rng(3)
+    step, wait, other = (rng.normal(size=(30, 8)).cumsum(axis=0) for _ in range(3))
+    wait = wait.mean(axis=0) + 0.1 * rng.normal(size=(30, 8))
+    assert not recurring(np.concatenate([step, other]).astype(np.float32)).any()
+    found = recurring(np.concatenate([wait, step, wait, other]).astype(np.float32))
+    assert found[8:22].all()
+    assert found[68:82].all()
+    assert not found[38:52].any()
+    assert not found[98:].any()
+    assert not recurring(np.zeros((5, 3), np.float32)).any()
+
+
+def test_waits_have_no_place_and_do_not_hide_an_order():
+    rng = np.random.default_rng(5)
+    orders = [*[range(STEPS)] * 8, SWAPPED]
+    waits = [rng.permutation([30, 30, 0, 0, 0]).tolist() for _ in orders]
+    score = judged([toy_video(orders[d], d, waits=waits[d]) for d in range(9)])
+    assert score.one_order > 0.7
+    assert score.exceeded["order"][8] > 1
+    assert score.exceeded["order"][:8].max() < 0.2
 
 
 def test_what_three_of_ten_videos_do_is_usual():

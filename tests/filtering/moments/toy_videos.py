@@ -13,9 +13,17 @@ LENGTH = 14
 
 
 def toy_video(
-    order: Sequence[int], seed: int, *, tempo: float = 1.0, works: Sequence[bool] | None = None
+    order: Sequence[int],
+    seed: int,
+    *,
+    tempo: float = 1.0,
+    works: Sequence[bool] | None = None,
+    waits: Sequence[int] | None = None,
 ) -> Video:
-    """A video of the steps `order`; a step that does not work leaves no square behind."""
+    """A video of the steps `order`; a step that does not work leaves no square behind.
+
+    `waits` has the moments for which nothing happens after each step.
+    """
     rng = np.random.default_rng(seed)
     paths = np.random.default_rng(99).normal(0, 1, (STEPS + 1, 2, FEATURES))
     looks, cells = [], []
@@ -29,6 +37,9 @@ def toy_video(
             )
             if moment == length // 2 and (works is None or works[place]):
                 image[4:9, 4 * step : 4 * step + 4] = (40 + 35 * step, 220 - 30 * step, 60)
+            cells.append(image + rng.normal(0, 2, image.shape))
+        for _ in range(waits[place] if waits else 0):
+            looks.append(np.zeros(FEATURES))
             cells.append(image + rng.normal(0, 2, image.shape))
     noise = rng.normal(0, 0.1, (len(looks), FEATURES))
     return Video(
