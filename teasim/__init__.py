@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Pool", "generate"]
 
-__version__ = "0.1.0"
-
 _ENTRY_POINTS = {"Pool": "teasim.pool", "generate": "teasim.generation"}
 """Public name -> module that defines it; imported when it is first used."""
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that `import teasim` is fast."""
+    if name == "__version__":  # stands in pyproject.toml
+        return import_module("importlib.metadata").version("teasim")
     if name not in _ENTRY_POINTS:
         raise AttributeError(f"module 'teasim' has no attribute '{name}'")
     return getattr(import_module(_ENTRY_POINTS[name]), name)

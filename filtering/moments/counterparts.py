@@ -61,6 +61,8 @@ class Match(NamedTuple):
     """(n,) moment of the other video that is the counterpart."""
     recurs: NDArray[np.bool_]
     """(n,) True where the moment or its counterpart recurs in its own video."""
+    again: NDArray[np.bool_]
+    """(n,) True where the moment recurs, and so does the most similar one of the other video."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,7 @@ def find_match(
     rows, nearest, at = np.arange(len(logs)), logs.argmin(axis=1), contested.argmin(axis=1)
     near = logs[rows, nearest]
     far = np.where(own, near, contested[rows, at])
-    return Match(near, nearest, far, at, own | other[at])
+    return Match(near, nearest, far, at, own | other[at], own & other[nearest])
 
 
 def recurring(video: Vectors) -> NDArray[np.bool_]:

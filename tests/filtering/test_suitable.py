@@ -143,7 +143,9 @@ def test_one_cell_is_enough_to_see_with() -> None:
 def matched(at: list[np.ndarray]) -> Counterparts:
     """Two videos of which each moment has the counterpart `at`."""
     nothing = [np.zeros(len(a), np.float32) for a in at]
-    there, back = (Match(zero, a, zero, a, zero > 0) for zero, a in zip(nothing, at, strict=True))
+    there, back = (
+        Match(zero, a, zero, a, zero > 0, zero > 0) for zero, a in zip(nothing, at, strict=True)
+    )
     return Counterparts(
         (len(at[0]), len(at[1])),
         (0, 1),

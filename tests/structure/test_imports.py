@@ -4,10 +4,13 @@ import ast
 import subprocess
 import sys
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 
 import grimp
 import pytest
+
+import teasim
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("teasim", "filtering", "policies")
@@ -77,6 +80,10 @@ def test_teasims_entry_points_are_what_they_are_called(first):
     program = f"{first}from teasim import Pool, generate; print(callable(generate), Pool.__name__)"
     command = [sys.executable, "-c", program]
     assert subprocess.check_output(command, cwd=ROOT, text=True) == "True Pool\n"
+
+
+def test_teasim_knows_its_version():
+    assert teasim.__version__ == version("teasim")
 
 
 def test_an_unknown_name_of_teasim_is_an_import_error():

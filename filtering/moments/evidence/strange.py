@@ -91,6 +91,11 @@ def _found_well(row: Sequence[Match | None], alike: Flags) -> tuple[Array, Array
 def _strange(match: Match, well: tuple[Array, Array]) -> tuple[Side, Side]:
     near, contested = well
     return (
-        Side(np.asarray(match.near - near[match.nearest], np.float64), match.nearest),
-        Side(np.asarray(match.contested - contested[match.at], np.float64), match.at),
+        _side(match, match.near - near[match.nearest], match.nearest),
+        _side(match, match.contested - contested[match.at], match.at),
     )
+
+
+def _side(match: Match, curve: NDArray[np.floating], at: NDArray[np.int64]) -> Side:
+    """Return one way of finding the moments; what recurs in both videos is strange in none."""
+    return Side(np.asarray(np.where(match.again, np.minimum(curve, 0), curve), np.float64), at)

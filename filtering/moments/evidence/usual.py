@@ -90,8 +90,13 @@ class Reference:
         return self.trusted and bool(self._peers.of(d)[self.number])
 
     def lack(self, d: int) -> Array:
-        """Return (n,): how much farther than usual the counterparts in d are."""
-        return self._match(d).contested - self._usual(self._lacks, d)
+        """Return (n,): how much farther than usual the counterparts in d are.
+
+        What recurs in both videos lacks in none, however often it is done.
+        """
+        match = self._match(d)
+        lack = match.contested - self._usual(self._lacks, d)
+        return np.where(match.again, np.minimum(lack, 0.0), lack)
 
     def shift(self, d: int) -> Array:
         """Return (n,): how much farther than usual the moments are moved in d."""

@@ -90,8 +90,20 @@ def test_moments_close_by_do_not_contest_a_place():
 def test_a_moment_recurs_where_it_or_its_counterpart_does():
     distances = np.where(np.eye(9, dtype=bool), 1.0, 8.0).astype(np.float32)
     own, other = unique(9), unique(9)
-    own[2], other[5] = True, True
-    assert np.flatnonzero(find_match(distances, own, other).recurs).tolist() == [2, 5]
+    own[[2, 3]], other[[3, 5]] = True, True
+    match = find_match(distances, own, other)
+    assert np.flatnonzero(match.recurs).tolist() == [2, 3, 5]
+    assert np.flatnonzero(match.again).tolist() == [3]
+
+
+def test_who_waits_less_has_left_nothing_out():
+    waits = [[30, 0, 0, 0, 30], [0, 30, 0, 0, 30], [0, 0, 30, 0, 30], [0, 0, 0, 30, 30]]
+    last = [60, 0, 0, 0, 0]
+    steps = [*[range(STEPS)] * 9, MISSING]
+    found = [*waits, *waits, last, waits[0][1:]]
+    score = judged([toy_video(steps[d], d, waits=found[d]) for d in range(10)])
+    assert score.exceeded["missing"].argmax() == 9
+    assert score.exceeded["missing"][8] < 0.3 * score.exceeded["missing"][9]
 
 
 def test_what_a_video_shows_twice_recurs():
