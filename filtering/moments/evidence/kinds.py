@@ -8,9 +8,10 @@ share VARIETY of the trusted videos reach, and W_k the quantile WELL over all vi
     order      moved_rd(t) - Q_k moved_rk(t)
     extra      c_dr(t) - W_k c_rk(at_dr(t))                            of moments t of d itself
 
-Order counts only where the counterpart of the counterpart is the moment itself: rests look all
-alike. What a share VARIETY of the videos does, an optional step left out or another legal order, is
-thus never evidence; nor is what is usual among the demonstrations of the same look, see `peers`.
+Order counts only where the counterpart of the counterpart is the moment itself. What recurs, such
+as waiting, says nothing, see `counterparts`. What a share VARIETY of the videos does, an optional
+step left out or another legal order, is thus never evidence; nor is what is usual among the
+demonstrations of the same look, see `peers`.
 Each curve is summed up by the mean of its largest twelfth over t, because a step is a part of a
 video; missing and order by the median over the trusted references of the same look, because a
 reference may be incorrect too; extra by the quantile SHARED over all of them, so that trust does

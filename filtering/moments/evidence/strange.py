@@ -97,5 +97,5 @@ def _strange(match: Match, well: tuple[Array, Array]) -> tuple[Side, Side]:
 
 
 def _side(match: Match, curve: NDArray[np.floating], at: NDArray[np.int64]) -> Side:
-    """Return one way of finding the moments; what recurs in both videos is strange in none."""
+    """Return one way of finding the moments; what recurs in both videos is strange in neither."""
     return Side(np.asarray(np.where(match.again, np.minimum(curve, 0), curve), np.float64), at)

@@ -92,7 +92,7 @@ class Reference:
     def lack(self, d: int) -> Array:
         """Return (n,): how much farther than usual the counterparts in d are.
 
-        What recurs in both videos lacks in none, however often it is done.
+        What recurs in both videos is lacking in neither, however often it is done.
         """
         match = self._match(d)
         lack = match.contested - self._usual(self._lacks, d)
