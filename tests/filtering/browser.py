@@ -21,6 +21,8 @@ FLAGS = (
     *("--no-first-run", "--disable-extensions", "--disable-background-networking"),
     *("--remote-debugging-pipe", "--hide-scrollbars", "--autoplay-policy=no-user-gesture-required"),
 )
+SETTINGS = ("PATH", "HOME", "LANG", "TMPDIR")
+"""Variables of the environment that the browser gets."""
 PATIENCE = 60.0
 """Longest wait for an answer [s]; a machine may be busy."""
 
@@ -167,16 +169,16 @@ class Browser:
 def browser(program: str, profile: Path) -> Iterator[Browser]:
     """A browser with a profile of its own; it ends with the block."""
     (child_in, write), (read, child_out) = os.pipe(), os.pipe()
-
-    def connect() -> None:  # the protocol's pipes are the descriptors 3 and 4
-        low, high = os.dup(child_in), os.dup(child_out)
-        os.dup2(low, 3)
-        os.dup2(high, 4)
-
+    # The protocol's pipes are the descriptors 3 and 4. The browser gets nothing else that this
+    # process has opened or that tests have set.
     process = subprocess.Popen(
-        [program, *FLAGS, f"--user-data-dir={profile}"],
-        close_fds=False,
-        preexec_fn=connect,
+        [
+            *("bash", "-c", f'exec "$0" "$@" 3<&{child_in} 4>&{child_out}', program, *FLAGS),
+            f"--user-data-dir={profile}",
+        ],
+        pass_fds=(child_in, child_out),
+        env={name: os.environ[name] for name in SETTINGS if name in os.environ},
+        cwd=profile,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
