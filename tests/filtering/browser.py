@@ -9,7 +9,7 @@ import os
 import shutil
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,16 @@ FLAGS = (
     *("--no-first-run", "--disable-extensions", "--disable-background-networking"),
     *("--remote-debugging-pipe", "--hide-scrollbars", "--autoplay-policy=no-user-gesture-required"),
 )
+STORE = """(() => {
+    const kept = new Map(Object.entries(ITEMS));
+    const store = {
+        getItem: (name) => kept.get(name) ?? null,
+        setItem: (name, text) => kept.set(name, String(text)),
+        items: () => Object.fromEntries(kept),
+    };
+    Object.defineProperty(window, "localStorage", { value: store });
+})()"""
+"""Gives a page a store that holds ITEMS."""
 SETTINGS = ("PATH", "HOME", "LANG", "TMPDIR")
 """Variables of the environment that the browser gets."""
 PATIENCE = 60.0
@@ -40,15 +50,12 @@ class Browser:
         self._buffer, self._count = b"", 0
         self._session: str | None = None
         self._context: str | None = None
+        self._script: str | None = None
         self.errors: list[str] = []
         self.forget()
 
     def forget(self) -> None:
-        """Go on in a new tab, which knows nothing that pages of the former one have stored.
-
-        Clearing the store instead may also remove what the next page writes: Chromium tells other
-        processes later that it was cleared.
-        """
+        """Go on in a new tab, which knows nothing that pages of the former one have stored."""
         former, self._session = self._context, None
         self._context = self.send("Target.createBrowserContext")["browserContextId"]
         self._new_tab()
@@ -60,14 +67,14 @@ class Browser:
     @contextmanager
     def other_tab(self) -> Iterator[None]:
         """Go on in a second tab beside the first; it is closed with the block."""
-        first, self._session = self._session, None
+        first, script, self._session = self._session, self._script, None
         target = self._new_tab()
         try:
             yield
         finally:
             self._session = None
             self.send("Target.closeTarget", targetId=target)
-            self._session = first
+            self._session, self._script = first, script
 
     def _new_tab(self) -> str:
         context = {"browserContextId": self._context}
@@ -76,6 +83,8 @@ class Browser:
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.send(f"{domain}.enable")
+        self._script = None
+        self.store({})
         return target
 
     def send(self, method: str, **parameters: Any) -> dict[str, Any]:
@@ -101,15 +110,27 @@ class Browser:
         self._drawn()
 
     def reload(self) -> None:
-        """Load the page again, no sooner than a person would.
-
-        Chromium hands what a page stores to another process. A page that is loaded at once may
-        read the store before that: wait for what it is to show.
-        """
-        self.run("new Promise(later => setTimeout(later, 500))")
+        """Load the page again, with what it has stored."""
+        self.store(self.stored())
         self.run("delete document.documentElement.dataset.ready")
         self.send("Page.reload")
         self._drawn()
+
+    def store(self, items: Mapping[str, str]) -> None:
+        """Give the next page of this tab a store that holds `items`.
+
+        It stands in for that of Chromium, which hands what one page has stored to another process
+        at a time of its own, on a busy machine after minutes or not at all.
+        """
+        if self._script:
+            self.send("Page.removeScriptToEvaluateOnNewDocument", identifier=self._script)
+        source = STORE.replace("ITEMS", json.dumps(dict(items)))
+        found = self.send("Page.addScriptToEvaluateOnNewDocument", source=source)
+        self._script = str(found["identifier"])
+
+    def stored(self) -> dict[str, str]:
+        """Return what the page has stored, and what was there before."""
+        return dict(self.run("localStorage.items()"))
 
     def _drawn(self) -> None:
         self.wait("document.documentElement?.dataset.ready !== undefined")
