@@ -25,8 +25,10 @@ _ENTRY_POINTS = {"Pool": "teasim.pool", "generate": "teasim.generation"}
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that `import teasim` is fast."""
-    if name == "__version__":  # stands in pyproject.toml
-        return import_module("importlib.metadata").version("teasim")
+    if name == "__version__":  # it stands in pyproject.toml alone
+        from importlib.metadata import version
+
+        return version("teasim")
     if name not in _ENTRY_POINTS:
         raise AttributeError(f"module 'teasim' has no attribute '{name}'")
     return getattr(import_module(_ENTRY_POINTS[name]), name)

@@ -11,10 +11,10 @@ least
 
     contested(t, u) = log D(t, u) + max(0, log D(t, u) - min over t' of log D(t', u)).
 
-What is done again and again, such as to wait for a while, has no place of its own: a moment of one
-wait has its counterpart in another one, earlier or later. A moment recurs if its own video shows
-nearly the same at another time. It says nothing about order, and neither does its counterpart; and
-that it is done less often is no evidence either, so that its place is not contested.
+What a video shows again and again, such as rests, has no place of its own: a moment of one rest has
+its counterpart in another rest, earlier or later. A moment recurs if its own video shows nearly the
+same at another time. Such a moment says nothing about order, and neither does its counterpart. How
+often it is shown is no evidence either, so that its place is not contested.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -38,12 +38,13 @@ ROUND_TRIP = 3
 APART = 6
 """Moments from which on another moment contests a place: 1.2 s, less than a step lasts."""
 ANOTHER_TIME = 12
-"""Moments from which on it is at another time that a video looks the same: 2.4 s, so that waits of
-5 s recur in themselves."""
+"""Moments from which on it is at another time that a video looks the same: 2.4 s, so that a rest of
+5 s recurs in itself."""
 RECURRING = -1.0
-"""Log distance, from the median between the moments of the same video, below which a moment at
-another time looks nearly the same. For all but one moment in twenty
-of five scenes it is -0.9 or more, for a quarter of them in tea-making with rests -1.5 or less."""
+"""Log distance, relative to the median between the moments of the same video, below which a moment
+at another time looks nearly the same. In five of the scenes TUNED_ON it is -0.9 or more for all but
+one moment in twenty. In tea-making with long rests, on which it was chosen, it is -1.5 or less for
+a quarter of the moments. Motions that are alike recur too, such as to turn the oven on and off."""
 TINY = 1e-6
 """Keeps logarithms finite where two videos are the same."""
 
@@ -89,6 +90,17 @@ def placed(there: Match, back: Match) -> NDArray[np.bool_]:
     return returned(there, back, ROUND_TRIP) & ~there.recurs
 
 
+def unless_again(match: Match, evidence: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return (n,): the evidence of moments, at most 0 for those that recur in both videos.
+
+    Args:
+        match: where the moments are found.
+        evidence: (n,) positive for moments that are found worse than usual.
+    """
+    spared = np.where(match.again, np.minimum(evidence, 0.0), evidence)
+    return np.asarray(spared, dtype=np.float64)
+
+
 def find_counterparts(vectors: Sequence[Vectors]) -> Counterparts:
     """Find the counterparts, with directions weighed by agreement.
 
@@ -98,15 +110,25 @@ def find_counterparts(vectors: Sequence[Vectors]) -> Counterparts:
     references = choose_references(vectors)
     among = compare([vectors[r] for r in references], range(len(references)))
     weighed = agreeing(vectors, _differences([vectors[r] for r in references], among))
-    return compare(weighed, references)
+    return compare(weighed, references, [recurring(one) for one in weighed])
 
 
-def compare(vectors: Sequence[Vectors], references: Sequence[int]) -> Counterparts:
-    """Compare every video with the references."""
+def compare(
+    vectors: Sequence[Vectors],
+    references: Sequence[int],
+    recurs: Sequence[NDArray[np.bool_]] | None = None,
+) -> Counterparts:
+    """Compare every video with the references.
+
+    Args:
+        vectors: per video (n, K).
+        references: numbers of the references.
+        recurs: per video (n,) True for moments that recur in it; None: no moment does.
+    """
+    own = recurs or [np.zeros(len(one), dtype=np.bool_) for one in vectors]
     there: list[list[Match | None]] = [[None] * len(vectors) for _ in references]
     back: list[list[Match | None]] = [[None] * len(vectors) for _ in references]
     rows = {video: row for row, video in enumerate(references)}
-    own = [recurring(one) for one in vectors]
     for row, r in enumerate(references):
         for d in range(len(vectors)):
             if d == r or there[row][d] is not None:

@@ -139,7 +139,7 @@ def by_length(chooser: Chooser, variant: FilterVariant) -> Sequence[WeightRow]:
 
 
 def by_chance(chooser: Chooser, variant: FilterVariant) -> Sequence[WeightRow]:
-    """Flag demonstrations at random, others in every pool of a plan."""
+    """Flag demonstrations at random; pools of the same size get different draws."""
     rng = np.random.default_rng([variant.seed, *chooser.name.encode()])
     losses = rng.random(len(chooser.pool.episodes))
     flagged = told_how_many(losses, _count(chooser, variant))

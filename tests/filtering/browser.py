@@ -28,7 +28,7 @@ STORE = """(() => {
         setItem: (name, text) => kept.set(name, String(text)),
         items: () => Object.fromEntries(kept),
     };
-    Object.defineProperty(window, "localStorage", { value: store });
+    Object.defineProperty(window, "localStorage", { value: store, configurable: true });
 })()"""
 """Gives a page a store that holds ITEMS."""
 SETTINGS = ("PATH", "HOME", "LANG", "TMPDIR")
@@ -43,38 +43,34 @@ def find_chromium() -> str | None:
 
 
 class Browser:
-    """A browser with one tab, unless another one is asked for."""
+    """A browser with one tab; `other_tab` opens a second one for a while."""
 
     def __init__(self, process: subprocess.Popen[bytes], read: int, write: int) -> None:
         self._process, self._read, self._write = process, read, write
         self._buffer, self._count = b"", 0
         self._session: str | None = None
         self._context: str | None = None
-        self._script: str | None = None
         self.errors: list[str] = []
         self.forget()
 
     def forget(self) -> None:
         """Go on in a new tab, which knows nothing that pages of the former one have stored."""
-        former, self._session = self._context, None
+        former = self._context
         self._context = self.send("Target.createBrowserContext")["browserContextId"]
         self._new_tab()
         if former:
-            session, self._session = self._session, None
             self.send("Target.disposeBrowserContext", browserContextId=former)
-            self._session = session
 
     @contextmanager
     def other_tab(self) -> Iterator[None]:
         """Go on in a second tab beside the first; it is closed with the block."""
-        first, script, self._session = self._session, self._script, None
+        first = self._session
         target = self._new_tab()
         try:
             yield
         finally:
-            self._session = None
             self.send("Target.closeTarget", targetId=target)
-            self._session, self._script = first, script
+            self._session = first
 
     def _new_tab(self) -> str:
         context = {"browserContextId": self._context}
@@ -83,15 +79,14 @@ class Browser:
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.send(f"{domain}.enable")
-        self._script = None
         self.store({})
         return target
 
     def send(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Call a method of the protocol."""
+        """Call a method of the protocol, of the browser in the domain Target, else of the tab."""
         self._count += 1
         message = {"id": self._count, "method": method, "params": parameters}
-        if self._session:
+        if not method.startswith("Target."):
             message["sessionId"] = self._session
         os.write(self._write, json.dumps(message).encode() + b"\0")
         while True:
@@ -119,17 +114,14 @@ class Browser:
     def store(self, items: Mapping[str, str]) -> None:
         """Give the next page of this tab a store that holds `items`.
 
-        It stands in for that of Chromium, which hands what one page has stored to another process
-        at a time of its own, on a busy machine after minutes or not at all.
+        It stands in for Chromium's own, which late in a long run did not hand what one page had
+        stored to the next. Scripts run in the order in which they were added; the last one counts.
         """
-        if self._script:
-            self.send("Page.removeScriptToEvaluateOnNewDocument", identifier=self._script)
         source = STORE.replace("ITEMS", json.dumps(dict(items)))
-        found = self.send("Page.addScriptToEvaluateOnNewDocument", source=source)
-        self._script = str(found["identifier"])
+        self.send("Page.addScriptToEvaluateOnNewDocument", source=source)
 
     def stored(self) -> dict[str, str]:
-        """Return what the page has stored, and what was there before."""
+        """Return what is in the store of the page."""
         return dict(self.run("localStorage.items()"))
 
     def _drawn(self) -> None:

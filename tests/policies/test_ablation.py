@@ -12,8 +12,12 @@ import pytest
 from policies.cli import ablate
 from policies.experiments import ablation, ablation_config
 from policies.experiments.ablation_config import AblationConfig
+from policies.experiments.choosing import Chooser, by_chance
+from policies.experiments.variants import FilterVariant
 from teasim.common import files
 from teasim.common.errors import ConfigError
+from teasim.common.workers import Workers
+from teasim.pool import Pool
 from teasim.pool.weight_table import read_weight_table
 from tests.policies.conftest import WITHOUT_TEA_BAG
 from tests.policies.fake_joints import FAKE_JOINTS_ID, make_joint_pool
@@ -313,6 +317,17 @@ def test_every_way_to_choose_ends_in_a_weight_table(many):
     assert flagged("theirs") == [False] * 7 + [True]
     weights = json.loads((many / "cells" / "pool--theirs--bc--0.json").read_text())["weights"]
     assert weights == pytest.approx([1, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
+
+
+def test_random_draws_others_in_every_pool(folder):
+    pool = Pool.open(folder / "pool")
+
+    def drawn(name):
+        chooser = Chooser(pool, name, {}, folder, folder, Workers(1))
+        return [row.loss for row in by_chance(chooser, FilterVariant("random", "random"))]
+
+    assert drawn("first") == drawn("first")
+    assert drawn("first") != drawn("second")
 
 
 def test_detection_stands_beside_the_scores_of_the_policies(many):

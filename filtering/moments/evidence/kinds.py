@@ -1,19 +1,19 @@
 """What counterparts say against a demonstration: a stretch is missing, out of order or extra.
 
 With c_rd(t) the contested log distance of the counterpart in video d of moment t of reference r,
-at_rd(t) its place, moved_rd(t) the share of the video that it has passed, Q_k the value that a
-share VARIETY of the trusted videos reach, and W_k the quantile WELL over all videos:
+at_rd(t) its place, moved_rd(t) the share of the sure moments that it has passed, Q_k the value
+that a share VARIETY of the trusted videos reach, and W_k the quantile WELL over all videos:
 
     missing    c_rd(t) - Q_k c_rk(t)
     order      moved_rd(t) - Q_k moved_rk(t)
     extra      c_dr(t) - W_k c_rk(at_dr(t))                            of moments t of d itself
 
-Order counts only where the counterpart of the counterpart is the moment itself. What recurs, such
-as waiting, says nothing, see `counterparts`. What a share VARIETY of the videos does, an optional
-step left out or another legal order, is thus never evidence; nor is what is usual among the
-demonstrations of the same look, see `peers`.
-Each curve is summed up by the mean of its largest twelfth over t, because a step is a part of a
-video; missing and order by the median over the trusted references of the same look, because a
+Order counts only where the counterpart of the counterpart is the moment itself, and for nothing
+that recurs, such as rests; what recurs in both videos is neither missing nor extra, see
+`counterparts`. What a share VARIETY of the videos does, an optional step left out or another legal
+order, is thus never evidence; nor is what is usual among the demonstrations of the same look, see
+`peers`. Each curve is summed up by the mean of its largest twelfth over t, because a step is a part
+of a video; missing and order by the median over the trusted references of the same look, because a
 reference may be incorrect too; extra by the quantile SHARED over all of them, so that trust does
 not change it. Extra is also found from plain nearest moments in place of counterparts, and the
 larger value counts: a step done twice is seen in contested places alone, and one that nobody else

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import Counterparts, Match
+from filtering.moments.counterparts import Counterparts, Match, unless_again
 from filtering.moments.evidence.peers import Flags, Looks, Peers, everybody
 from filtering.moments.evidence.replaced import Side
 from filtering.moments.evidence.usual import FEWEST
@@ -91,11 +91,6 @@ def _found_well(row: Sequence[Match | None], alike: Flags) -> tuple[Array, Array
 def _strange(match: Match, well: tuple[Array, Array]) -> tuple[Side, Side]:
     near, contested = well
     return (
-        _side(match, match.near - near[match.nearest], match.nearest),
-        _side(match, match.contested - contested[match.at], match.at),
+        Side(unless_again(match, match.near - near[match.nearest]), match.nearest),
+        Side(unless_again(match, match.contested - contested[match.at]), match.at),
     )
-
-
-def _side(match: Match, curve: NDArray[np.floating], at: NDArray[np.int64]) -> Side:
-    """Return one way of finding the moments; what recurs in both videos is strange in neither."""
-    return Side(np.asarray(np.where(match.again, np.minimum(curve, 0), curve), np.float64), at)

@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, placed
+from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, placed, unless_again
 from filtering.moments.evidence.peers import Peers
 from filtering.moments.evidence.stretches import worst
 
@@ -16,10 +16,9 @@ VARIETY = 0.3
 RECOGNISED = 1.2
 """Largest log of how much farther than usual a counterpart may be for its place to count: what is
 done at another place is done among other things."""
-
-
 LEAST_SURE = 0.5
-"""Least share of a video that moments are taken to pass a share of: a few sure ones tell little."""
+"""Share of a video by which passed moments are divided at least: where only a few moments are sure,
+they tell little."""
 FEWEST = 2
 """Least number of videos that say what is usual, beside a reference and who is judged."""
 
@@ -41,7 +40,7 @@ def rows_of(found: Counterparts, peers: Peers) -> list[int]:
 
 
 def moved(at: NDArray[np.int64], sure: NDArray[np.bool_]) -> Array:
-    """Return (n,): the share of the moments that each moment has passed in the other video.
+    """Return (n,): the share of the sure moments that each moment has passed in the other video.
 
     That are the moments that came before it and come after it in the other, or the other way round.
     Tempo, rests and what is left out elsewhere change nothing about it.
@@ -90,13 +89,9 @@ class Reference:
         return self.trusted and bool(self._peers.of(d)[self.number])
 
     def lack(self, d: int) -> Array:
-        """Return (n,): how much farther than usual the counterparts in d are.
-
-        What recurs in both videos is lacking in neither, however often it is done.
-        """
+        """Return (n,): how much farther than usual the counterparts in d are."""
         match = self._match(d)
-        lack = match.contested - self._usual(self._lacks, d)
-        return np.where(match.again, np.minimum(lack, 0.0), lack)
+        return unless_again(match, match.contested - self._usual(self._lacks, d))
 
     def shift(self, d: int) -> Array:
         """Return (n,): how much farther than usual the moments are moved in d."""

@@ -3,8 +3,11 @@ import pytest
 
 from filtering.judging.moments import Timeline, judge_moments
 from filtering.moments.agreement import agree
+from filtering.moments.confirmed import confirmation
 from filtering.moments.counterparts import (
     APART,
+    Counterparts,
+    Match,
     choose_references,
     compare,
     find_counterparts,
@@ -96,22 +99,30 @@ def test_a_moment_recurs_where_it_or_its_counterpart_does():
     assert np.flatnonzero(match.again).tolist() == [3]
 
 
-def test_who_waits_less_has_left_nothing_out():
-    waits = [[30, 0, 0, 0, 30], [0, 30, 0, 0, 30], [0, 0, 30, 0, 30], [0, 0, 0, 30, 30]]
+def test_the_place_of_what_recurs_is_not_contested():
+    distances = np.array([[1.0]] * (APART + 1) + [[2.0]], dtype=np.float32)
+    own = unique(APART + 2)
+    assert find_match(distances, own, unique(1)).contested[-1] == pytest.approx(2 * np.log(2.0))
+    own[-1] = True
+    assert find_match(distances, own, unique(1)).contested[-1] == pytest.approx(np.log(2.0))
+
+
+def test_who_rests_less_has_left_nothing_out():
+    rests = [[30, 0, 0, 0, 30], [0, 30, 0, 0, 30], [0, 0, 30, 0, 30], [0, 0, 0, 30, 30]]
     last = [60, 0, 0, 0, 0]
     steps = [*[range(STEPS)] * 9, MISSING]
-    found = [*waits, *waits, last, waits[0][1:]]
-    score = judged([toy_video(steps[d], d, waits=found[d]) for d in range(10)])
+    found = [*rests, *rests, last, rests[0][1:]]
+    score = judged([toy_video(steps[d], d, rests=found[d]) for d in range(10)])
     assert score.exceeded["missing"].argmax() == 9
     assert score.exceeded["missing"][8] < 0.3 * score.exceeded["missing"][9]
 
 
 def test_what_a_video_shows_twice_recurs():
     rng = np.random.default_rng(3)
-    step, wait, other = (rng.normal(size=(30, 8)).cumsum(axis=0) for _ in range(3))
-    wait = wait.mean(axis=0) + 0.1 * rng.normal(size=(30, 8))
+    step, rest, other = (rng.normal(size=(30, 8)).cumsum(axis=0) for _ in range(3))
+    rest = rest.mean(axis=0) + 0.1 * rng.normal(size=(30, 8))
     assert not recurring(np.concatenate([step, other]).astype(np.float32)).any()
-    found = recurring(np.concatenate([wait, step, wait, other]).astype(np.float32))
+    found = recurring(np.concatenate([rest, step, rest, other]).astype(np.float32))
     assert found[8:22].all()
     assert found[68:82].all()
     assert not found[38:52].any()
@@ -119,11 +130,11 @@ def test_what_a_video_shows_twice_recurs():
     assert not recurring(np.zeros((5, 3), np.float32)).any()
 
 
-def test_waits_have_no_place_and_do_not_hide_an_order():
+def test_rests_have_no_place_and_do_not_hide_an_order():
     rng = np.random.default_rng(5)
     orders = [*[range(STEPS)] * 8, SWAPPED]
-    waits = [rng.permutation([30, 30, 0, 0, 0]).tolist() for _ in orders]
-    score = judged([toy_video(orders[d], d, waits=waits[d]) for d in range(9)])
+    rests = [rng.permutation([30, 30, 0, 0, 0]).tolist() for _ in orders]
+    score = judged([toy_video(orders[d], d, rests=rests[d]) for d in range(9)])
     assert score.one_order > 0.7
     assert score.exceeded["order"][8] > 1
     assert score.exceeded["order"][:8].max() < 0.2
@@ -304,6 +315,28 @@ def test_a_moved_step_passes_what_lies_between():
     assert not far[:10].any()
     assert far[10:].min() > 0.15
     assert not moved(at, ~sure).any()
+
+
+def test_passed_moments_are_a_share_of_the_sure_ones_but_of_half_a_video_at_least():
+    at = np.argsort(np.r_[0:10, 20:30, 10:20])
+    for sure, of in ((np.arange(30) >= 10, 20), (np.arange(30) % 3 == 0, 15)):
+        most = sure[10:20].sum()  # every late moment is passed by this many
+        assert moved(at, sure).max() == pytest.approx(most / of)
+
+
+def test_sub_tasks_are_compared_where_moments_have_a_place():
+    at, zero = np.arange(20), np.zeros(20, np.float32)
+    labels = np.repeat([0, 1], 10)
+    other = np.where((at >= 5) & (at < 10), 1, labels)
+
+    def agreement(recurs):
+        match = Match(zero, at, zero, at, recurs, recurs)
+        both = ((None, match), (match, None))
+        return confirmation(Counterparts((20, 20), (0, 1), both, both), [labels, other])
+
+    assert agreement(other != labels) == 1
+    assert agreement(unique(20)) < 0.6
+    assert agreement(~unique(20)) == 0
 
 
 @pytest.mark.parametrize(

@@ -18,11 +18,11 @@ def toy_video(
     *,
     tempo: float = 1.0,
     works: Sequence[bool] | None = None,
-    waits: Sequence[int] | None = None,
+    rests: Sequence[int] | None = None,
 ) -> Video:
     """A video of the steps `order`; a step that does not work leaves no square behind.
 
-    `waits` has the moments for which nothing happens after each step.
+    `rests` are the numbers of moments after each step in which nothing happens.
     """
     rng = np.random.default_rng(seed)
     paths = np.random.default_rng(99).normal(0, 1, (STEPS + 1, 2, FEATURES))
@@ -38,7 +38,7 @@ def toy_video(
             if moment == length // 2 and (works is None or works[place]):
                 image[4:9, 4 * step : 4 * step + 4] = (40 + 35 * step, 220 - 30 * step, 60)
             cells.append(image + rng.normal(0, 2, image.shape))
-        for _ in range(waits[place] if waits else 0):
+        for _ in range(rests[place] if rests else 0):
             looks.append(np.zeros(FEATURES))
             cells.append(image + rng.normal(0, 2, image.shape))
     noise = rng.normal(0, 0.1, (len(looks), FEATURES))
