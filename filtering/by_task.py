@@ -121,6 +121,7 @@ def _joined(
     whole.chosen_ = each[0].chosen_
     whole.cameras_ = _cameras(pool, [fit.cameras_ for fit in each])
     whole.looked_at_ = _cameras(pool, [fit.looked_at_ for fit in each])
+    whole.effects_ = any(fit.effects_ for fit in each)
     whole.decision_, whole.objective_, whole.summary_ = None, None, None
     whole.threshold_ = max(fit.threshold_ for fit in each)
     names = dict.fromkeys(

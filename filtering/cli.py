@@ -177,7 +177,10 @@ def basis(fitted: "DemoFilter") -> str:
             )
         return f"Judged by moments and found sub-tasks of the videos alone (camera {cameras})."
     if chosen.segmenter == "logged":
-        return "Judged by the logged sub-tasks."
+        changed = ", and by what they change in the logged state of the environment"
+        return (
+            f"Judged by the logged sub-tasks{changed if fitted.effects_ and not cameras else ''}."
+        )
     if chosen.segmenter == "predictions":
         return "Judged by the predictions stored in the folder."
     if chosen.segmenter == "clustering":

@@ -50,8 +50,8 @@ class FilterConfig(JudgingConfig):
     """Camera whose pictures are used; may be repeated. By default the main camera, and all cameras
     for effects."""
     effects: bool = True
-    """Compare the video before and after each segment: an ineffective step counts like one left
-    out. For the score norm."""
+    """Compare the video, or without one the logged state of the environment, before and after each
+    segment: an ineffective step counts like one left out. For the score norm."""
     frames_per_segment: Frames = 64
     """Largest number of frames used per segment (paper section 3.2); with vgg16 exactly so many,
     those of shorter segments repeated. For the score equation3."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.config import AGREEMENT, CLUSTERING, COMBINED, MOMENTS, FilterConfig
-from filtering.effects.rests import changes, look_at_rests
+from filtering.effects.rests import changes, logged_rests, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.features.config import POOLED
 from filtering.features.extraction import segment_features
@@ -130,6 +130,8 @@ from the whole video.
         cameras_: cameras used for segments and states; effects use all cameras of the pool unless
             some are named.
         looked_at_: cameras whose pictures were looked at.
+        effects_: whether segments were examined for what they change, in the pictures or, without
+            them, in the log of the environment.
         timings_: seconds per stage.
     """
 
@@ -152,6 +154,7 @@ from the whole video.
     chosen_: FilterConfig
     cameras_: tuple[str, ...]
     looked_at_: tuple[str, ...]
+    effects_: bool
     timings_: dict[str, float]
 
     def __init__(self, config: FilterConfig | None = None) -> None:
@@ -172,7 +175,7 @@ from the whole video.
             PoolError: the pool is damaged or has no labelled sub-tasks.
         """
         self.timings_, self._notes = {}, tuple[str, ...]()
-        self.tasks_ = ()
+        self.tasks_, self.effects_ = (), False
         self._check(pool)
         require_sound(pool)
         self.chosen_ = self.config.for_source(pool)
@@ -351,20 +354,24 @@ from the whole video.
         known = Evidence(found.subtasks, found.spans, reliability=found.reliability())
         if self.chosen_.score == "equation3":
             return replace(known, states=self._states(pool, workers))
-        if self.config.effects and pool.cameras:
-            return replace(known, ineffective=self._ineffective(pool, known, workers))
-        return known
+        rests = self._rests(pool, workers) if self.config.effects else None
+        self.effects_ = rests is not None
+        if rests is None:
+            return known
+        surprises = effect_surprises([changes(rest) for rest in rests], known.labels)
+        return replace(known, ineffective=surprises)
 
-    def _ineffective(
-        self, pool: Source, known: Evidence, workers: Workers
-    ) -> list[NDArray[np.float64]]:
-        """Return per demonstration (q,): how surprisingly little each segment changed [nats]."""
+    def _rests(self, pool: Source, workers: Workers) -> list[NDArray[np.float64]] | None:
+        """Return per demonstration (q + 1, F) what is at rest around its segments, if known.
+
+        Without pictures it is the log of the environment.
+        """
+        spans = self.segments_.spans
+        if not pool.cameras:
+            return logged_rests(pool, spans)
         source = FrameSource(self.config.cameras or pool.cameras)
         self._seen.update(source.cameras)
-        rests = look_at_rests(
-            pool.episodes, self.segments_.spans, frame_rate(pool), source, workers=workers
-        )
-        return effect_surprises([changes(rest) for rest in rests], known.labels)
+        return look_at_rests(pool.episodes, spans, frame_rate(pool), source, workers=workers)
 
     def _states(self, pool: Source, workers: Workers) -> list[NDArray[np.float64]]:
         """Return per demonstration (q, N): features of its segments; one-hot without pictures."""

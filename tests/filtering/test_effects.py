@@ -1,16 +1,22 @@
 """A segment that changes less than usual is noticed; usual segments cost nothing."""
 
+import shutil
 from collections.abc import Sequence
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
+from filtering import DemoFilter, FilterConfig
+from filtering.cli import basis
 from filtering.effects.rests import changes, look_at_rests, rest_features, rest_moments
 from filtering.effects.surprise import effect_surprises
 from filtering.vision.frame_features import FrameSource, frame_features
 from teasim.common.workers import IN_PROCESS
+from teasim.constants import SUBTASKS
 from teasim.pool import Pool, Span
-from tests.toy_pool import SEQ_1
+from teasim.pool.lerobot.layout import ENVIRONMENT_STATE
+from tests.toy_pool import SEQ_1, make_toy_pool, rewrite_table
 
 FEATURES = 40
 INVISIBLE = "stir"
@@ -101,3 +107,32 @@ def test_looking_at_rests_alone_sees_the_same(toy_pool: Pool):
         full = rest_features(features, episode.length, episode.spans(), toy_pool.fps)
         np.testing.assert_allclose(rests, full, atol=1e-4)
         assert len(rests) == len(episode.spans()) + 1
+
+
+def without_effect(table: pa.Table, subtask: str) -> pa.Table:
+    """A joint log that never says that a sub-task is done."""
+    rows = np.array(table.column(ENVIRONMENT_STATE).to_pylist())
+    rows[:, SUBTASKS.index(subtask)] = 0.0
+    field = table.schema.field(ENVIRONMENT_STATE)
+    place = table.schema.get_field_index(ENVIRONMENT_STATE)
+    return table.set_column(place, field, pa.array(rows.tolist(), field.type))
+
+
+def test_without_pictures_the_log_of_the_environment_shows_what_has_no_effect(tmp_path) -> None:
+    pool = make_toy_pool(tmp_path / "toy", [SEQ_1] * 8, cameras=())
+    clean = DemoFilter(FilterConfig()).fit(pool)
+    assert not clean.flagged_.any()
+    log = sorted(pool.root.glob("data/*/*.parquet"))[5]
+    rewrite_table(log, lambda table: without_effect(table, "add_milk"))
+    shutil.rmtree(pool.root / "teasim")  # its check sums are those of the log before
+    damaged = Pool.open(pool.root)
+    fitted = DemoFilter(FilterConfig()).fit(damaged)
+    assert np.flatnonzero(fitted.flagged_).tolist() == [5]
+    assert "'add_milk' was carried out" in fitted.reasons_[5]
+    assert basis(fitted) == (
+        "Judged by the logged sub-tasks, and by what they change in the logged state of the "
+        "environment."
+    )
+    blind = DemoFilter(FilterConfig(effects=False)).fit(damaged)
+    assert not blind.flagged_.any()
+    assert basis(blind) == "Judged by the logged sub-tasks."
