@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.config import AGREEMENT, CLUSTERING, COMBINED, MOMENTS, FilterConfig
-from filtering.effects.rests import changes, logged_rests, look_at_rests
+from filtering.effects.logged import log_surprises
+from filtering.effects.rests import changes, look_at_rests
 from filtering.effects.surprise import effect_surprises
 from filtering.features.config import POOLED
 from filtering.features.extraction import segment_features
@@ -354,24 +355,24 @@ from the whole video.
         known = Evidence(found.subtasks, found.spans, reliability=found.reliability())
         if self.chosen_.score == "equation3":
             return replace(known, states=self._states(pool, workers))
-        rests = self._rests(pool, workers) if self.config.effects else None
-        self.effects_ = rests is not None
-        if rests is None:
-            return known
-        surprises = effect_surprises([changes(rest) for rest in rests], known.labels)
-        return replace(known, ineffective=surprises)
+        ineffective = self._ineffective(pool, known, workers) if self.config.effects else None
+        self.effects_ = ineffective is not None
+        return replace(known, ineffective=ineffective)
 
-    def _rests(self, pool: Source, workers: Workers) -> list[NDArray[np.float64]] | None:
-        """Return per demonstration (q + 1, F) what is at rest around its segments, if known.
+    def _ineffective(
+        self, pool: Source, known: Evidence, workers: Workers
+    ) -> list[NDArray[np.float64]] | None:
+        """Return per demonstration (q,): how surprisingly little each segment changed [nats].
 
-        Without pictures it is the log of the environment.
+        It is seen in the pictures or, without them, in the log of the environment, if there is one.
         """
         spans = self.segments_.spans
         if not pool.cameras:
-            return logged_rests(pool, spans)
+            return log_surprises(pool, spans, known.labels)
         source = FrameSource(self.config.cameras or pool.cameras)
         self._seen.update(source.cameras)
-        return look_at_rests(pool.episodes, spans, frame_rate(pool), source, workers=workers)
+        rests = look_at_rests(pool.episodes, spans, frame_rate(pool), source, workers=workers)
+        return effect_surprises([changes(rest) for rest in rests], known.labels)
 
     def _states(self, pool: Source, workers: Workers) -> list[NDArray[np.float64]]:
         """Return per demonstration (q, N): features of its segments; one-hot without pictures."""

@@ -24,8 +24,7 @@ from filtering.vision.frame_features import (
 )
 from teasim.common.workers import Workers
 from teasim.pool import Span
-from teasim.pool.lerobot.layout import ENVIRONMENT_STATE
-from teasim.pool.source import Clip, Demonstration, Source
+from teasim.pool.source import Clip, Demonstration
 
 REST = 0.3
 """Frames up to this far from the border of two segments are averaged [s]; short, because the hands
@@ -95,30 +94,6 @@ def look_at_rests(
     described = look_up_or_describe(tasks, _key, describe_rests, workers)
     videos = side_by_side(described, len(source.cameras))
     return [_means(moments, chosen) for moments, chosen in zip(videos, places, strict=True)]
-
-
-def logged_rests(
-    pool: Source, segments: Sequence[tuple[Span, ...]]
-) -> list[NDArray[np.float64]] | None:
-    """Return per demonstration (q + 1, F): the logged state of the environment at rest.
-
-    Args:
-        pool: demonstrations without pictures.
-        segments: the segments of each.
-
-    Returns:
-        The means of the log before the first of q segments and after each; None if there is no
-        such log, or the frame rate is not known.
-
-    Raises:
-        PoolError: a log is damaged.
-    """
-    if ENVIRONMENT_STATE not in pool.logs or pool.fps is None:
-        return None
-    return [
-        rest_features(episode.log(ENVIRONMENT_STATE), episode.length, spans, pool.fps)
-        for episode, spans in zip(pool.episodes, segments, strict=True)
-    ]
 
 
 def changes(rests: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -47,14 +47,14 @@ def effect_surprises(changes: Sequence[Array], labels: Sequence[Sequence[int]]) 
     """
     lengths = [len(rows) for rows in changes]
     demos = np.repeat(np.arange(len(changes)), lengths)
-    steps = _steps(labels)
+    steps = number_steps(labels)
     with threadpool_limits(limits=1, user_api="blas"):
         amounts = effect_amounts(_main_directions(np.vstack(changes)), steps, demos)
     nats = np.zeros(len(amounts))
     for row in np.flatnonzero(np.isfinite(amounts)):
         others = amounts[(steps == steps[row]) & (demos != demos[row])]
         # The opposite of the usual effect counts as no effect.
-        nats[row] = (1 - 2 * max(amounts[row], 0.0)) / (2 * _spread(others) ** 2)
+        nats[row] = (1 - 2 * max(amounts[row], 0.0)) / (2 * spread_of(others) ** 2)
     return np.split(np.maximum(nats, 0.0), np.cumsum(lengths)[:-1])
 
 
@@ -84,7 +84,7 @@ def effect_amounts(changes: Array, steps: NDArray[np.int64], demos: NDArray[np.i
     return amounts
 
 
-def _steps(labels: Sequence[Sequence[int]]) -> NDArray[np.int64]:
+def number_steps(labels: Sequence[Sequence[int]]) -> NDArray[np.int64]:
     """Number all segments (S,): equal for the same sub-task after the same sub-tasks."""
     keys = [(label, frozenset(demo[:k])) for demo in labels for k, label in enumerate(demo)]
     numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
@@ -110,7 +110,7 @@ def _precision(residuals: Array) -> Array:
     return precision
 
 
-def _spread(amounts: Array) -> float:
+def spread_of(amounts: Array) -> float:
     """Return s from the amounts of the other demonstrations: their scatter about 1, and a prior."""
     known = amounts[np.isfinite(amounts)]
     scatter = 1.4826 * float(np.median(np.abs(known - 1.0))) if len(known) else 0.0

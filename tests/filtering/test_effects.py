@@ -9,6 +9,7 @@ import pytest
 
 from filtering import DemoFilter, FilterConfig
 from filtering.cli import basis
+from filtering.effects.logged import ROBOT, change_surprises
 from filtering.effects.rests import changes, look_at_rests, rest_features, rest_moments
 from filtering.effects.surprise import effect_surprises
 from filtering.vision.frame_features import FrameSource, frame_features
@@ -116,6 +117,25 @@ def without_effect(table: pa.Table, subtask: str) -> pa.Table:
     field = table.schema.field(ENVIRONMENT_STATE)
     place = table.schema.get_field_index(ENVIRONMENT_STATE)
     return table.set_column(place, field, pa.array(rows.tolist(), field.type))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 0.6])
+@pytest.mark.parametrize("demos", [6, 40])
+def test_a_log_shows_what_is_lacking_in_part(demos, share) -> None:
+    rng = np.random.default_rng(5)
+    usual = rng.normal(size=(3, 6)) * [1, 1, 1, 1, 0, 0]  # two numbers never change
+    pool = [usual + rng.normal(scale=0.01, size=usual.shape) for _ in range(demos)]
+    pool[2][1] *= share
+    nats = change_surprises(pool, [[0, 1, 2]] * demos)
+    assert nats[2][1] > (1 if demos > 6 else 0)
+    nats[2][1] = 0
+    assert max(map(max, nats)) == 0
+    assert [*map(len, change_surprises(pool[:2], [[0, 1, 2]] * 2))] == [3, 3]  # too few to compare
+
+
+def test_numbers_of_the_robot_are_known_by_their_names() -> None:
+    names = ("cube_x", "knob_in_right_hand_x", "robot0_eef_pos_0", "gripper_to_can_pos_x")
+    assert [bool(ROBOT.search(name)) for name in names] == [False, True, True, True]
 
 
 def test_without_pictures_the_log_of_the_environment_shows_what_has_no_effect(tmp_path) -> None:
