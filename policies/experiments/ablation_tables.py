@@ -16,6 +16,7 @@ from policies.experiments.playing import (
     merged,
 )
 from policies.experiments.tabular import html_page, html_table, markdown_table, write_rows
+from policies.experiments.variants import LearnerVariant
 from policies.play.evaluation import MODES, Scores
 from teasim.common.figures import AccuracyFigure, Drawing
 from teasim.common.figures.accuracy import Point
@@ -84,6 +85,16 @@ class Found:
         over_steps = {isinstance(s, Scores) for s in self._scores()}
         names = {True: "policy accuracy", False: "sub-tasks done"}
         return " or ".join(names[kind] for kind in sorted(over_steps, reverse=True))
+
+    @property
+    def modes(self) -> list[str]:
+        """Modes in which any policy decides; one that draws nothing has no sampled decisions."""
+        return [mode for mode in MODES if any(mode in by_mode for by_mode in self.cells.values())]
+
+    def learners(self, config: AblationConfig, mode: str) -> list[LearnerVariant]:
+        """Return the learners of `config` whose policies decide in `mode`."""
+        used = {cell.learner for cell, by_mode in self.cells.items() if mode in by_mode}
+        return [learner for learner in config.learners if learner.name in used]
 
     def _scores(self) -> Iterator[AnyScores]:
         return (s for by_mode in self.cells.values() for s in by_mode.values())
@@ -164,7 +175,7 @@ def tables_of(config: AblationConfig, found: Found) -> dict[str, list[dict[str, 
     """Return the tables to read, by title."""
     tables = by_number(config, found) | {
         f"{mode} decisions, {config.episodes} episodes per policy": _table(config, found, mode)
-        for mode in MODES
+        for mode in found.modes
     }
     rows = [
         {
@@ -200,10 +211,10 @@ def by_number(config: AblationConfig, found: Found) -> dict[str, list[dict[str, 
                 **_pooled(config, found, (variant.name, learner.name, mode), k),
             }
             for k in sorted(set(incorrect.values()))
-            for learner in config.learners
+            for learner in found.learners(config, mode)
             for variant in config.filters
         ]
-        for mode in MODES
+        for mode in found.modes
     }
 
 
@@ -242,7 +253,7 @@ def _gap(mine: list[AnyScores], theirs: list[AnyScores]) -> Difference:
 def _table(config: AblationConfig, found: Found, mode: str) -> list[dict[str, Any]]:
     rows = []
     for pool in config.pools:
-        for learner in config.learners:
+        for learner in found.learners(config, mode):
             by_filter = {
                 variant.name: [
                     found.cells[Cell(pool.name, variant.name, learner.name, seed)][mode]
@@ -314,11 +325,11 @@ def ablation_figures(config: AblationConfig, found: Found) -> dict[str, Drawing]
                     for k in sorted(set(incorrect.values()))
                 )
                 for variant in config.filters
-                for learner in config.learners
+                for learner in found.learners(config, mode)
             },
             found.measure,
         )
-        for mode in MODES
+        for mode in found.modes
     }
 
 

@@ -32,6 +32,7 @@ TINY = Size(
     unlabelled=(1,),
     frames=1,
     incorrect=(2,),
+    pixels=64,
     episodes=1,
     training_seeds=1,
 )

@@ -484,17 +484,32 @@ def test_pools_are_made_from_options(folder, tmp_path, monkeypatch):
     assert "| made | all | bc | " in (tmp_path / "results.md").read_text()
 
 
-def test_a_learner_of_joints_stands_in_the_same_tables(tmp_path):
+NEAREST = '[learners.near]\nlearner = "nearest"\nlevel = "joint"\n'
+CHUNKS = '[learners.act]\nlevel = "joint"\nsteps = 20\nwidth = 16\nbatch = 16\n'
+"""Learners of joints: one whose policies draw, and one whose policies do not."""
+
+
+@pytest.mark.parametrize(
+    ("learners", "modes"),
+    [
+        (NEAREST, ["deterministic", "sampled"]),
+        (CHUNKS, ["deterministic"]),
+        (NEAREST + CHUNKS, ["deterministic", "sampled", "deterministic"]),
+    ],
+)
+def test_a_learner_of_joints_stands_in_the_same_tables(tmp_path, learners, modes):
     make_joint_pool(tmp_path / "joints")
     (tmp_path / "plan.toml").write_text(
         f'pools = ["joints"]\nepisodes = 1\njoint_env_id = "{FAKE_JOINTS_ID}"\n'
-        '[learners.near]\nlearner = "nearest"\nlevel = "joint"\n[filters.all]\nuse = "ignore"\n'
+        f'{learners}[filters.all]\nuse = "ignore"\n'
     )
     ablate([str(tmp_path / "plan.toml"), "-o", str(tmp_path / "out"), "--jobs", "1"])
     rows = rows_of(tmp_path / "out" / "results.csv")
-    assert [row["mode"] for row in rows] == ["deterministic", "sampled"]
+    assert [row["mode"] for row in rows] == modes
     assert all(row["subtasks_done"] and not row["policy_accuracy"] for row in rows)
-    assert "| sub-tasks done |" in (tmp_path / "out" / "results.md").read_text()
+    text = (tmp_path / "out" / "results.md").read_text()
+    assert text.count("| sub-tasks done |") == len(set(modes))
+    assert text.count("| joints | all | ") == len(modes)
 
 
 def test_an_ablation_killed_ten_times_ends_with_the_same_tables(folder, tmp_path):

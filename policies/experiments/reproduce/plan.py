@@ -46,9 +46,10 @@ SECONDS_PER_CLUSTERED = 9.0
 SECONDS_PER_FILTERED = 12.0
 """Judging a pool by the default filter with a network, the videos looked at already [s]."""
 SECONDS_PER_WATCHED = 11.0
-"""Judging a video of two cameras of 224 pixels by the default filter, for the first time [s]."""
+"""Judging a video of two cameras of 224 pixels by the default filter, for the first time [s]; less
+in proportion to the pixels."""
 SECONDS_PER_PICTURED = 25.0
-"""Learning a policy from pictures and scoring it [s]."""
+"""Learning a policy from pictures of 224 pixels and scoring it [s]; likewise."""
 SECONDS_PER_EPISODE = 2.0
 """An episode of a policy [s]; episodes that repeat another's decisions are nearly free."""
 
@@ -81,6 +82,8 @@ class Size:
     """Frames per segment for the features of equation 3."""
     incorrect: tuple[int, ...]
     """Numbers of incorrect demonstrations of figure 6."""
+    pixels: int
+    """Side of the pictures that the policies of figure 6 learn from."""
     episodes: int
     """Episodes per policy and mode of figure 6."""
     training_seeds: int
@@ -97,11 +100,12 @@ SIZES: Mapping[str, Size] = MappingProxyType(
             epochs=60,
             networks=1,
             ladder=(1, 3),
-            pools=6,
+            pools=3,
             clustered=1,
             unlabelled=(1, 4, 8),
             frames=8,
             incorrect=(2, 8),
+            pixels=128,
             episodes=4,
             training_seeds=1,
         ),
@@ -118,6 +122,7 @@ SIZES: Mapping[str, Size] = MappingProxyType(
             unlabelled=(1, 2, 4, 6, 8),
             frames=64,
             incorrect=(1, 2, 4, 6, 8),
+            pixels=224,  # the paper's, section 3.2
             episodes=50,
             training_seeds=3,
         ),

@@ -68,7 +68,8 @@ def _unit(plan: Plan, k: int, seen: str) -> Unit:
     seconds = policies * len(MODES) * size.episodes * SECONDS_PER_EPISODE / 2
     needs = {"bank": _bank(plan, k)}
     if seen == PICTURES:
-        seconds += (CORRECT + k) * SECONDS_PER_WATCHED + policies * SECONDS_PER_PICTURED
+        looking = (CORRECT + k) * SECONDS_PER_WATCHED + policies * SECONDS_PER_PICTURED
+        seconds += looking * (size.pixels / 224) ** 2
     else:
         needs["filtered"] = _unit(plan, k, PICTURES)
     return Unit("policies", spec, needs, seconds, wide=True)
@@ -76,7 +77,7 @@ def _unit(plan: Plan, k: int, seen: str) -> Unit:
 
 def _bank(plan: Plan, k: int) -> Unit:
     seed = POOL_SEED + 100 * plan.seed + k
-    options = {"seq1": CORRECT, "seq3": k, "seed": seed}
+    options = {"seq1": CORRECT, "seq3": k, "size": plan.size.pixels, "seed": seed}
     return Unit("bank", {"options": options}, seconds=(CORRECT + k) * SECONDS_PER_DEMO, wide=True)
 
 
