@@ -26,7 +26,7 @@ from teasim.pool import Span
 from teasim.pool.lerobot.layout import ENVIRONMENT_STATE
 from teasim.pool.source import Source
 
-ROBOT = re.compile(r"hand|gripper|eef|tcp")
+ROBOT = re.compile(r"hand(?!le)|gripper|eef|tcp")
 """Names of numbers that say where the robot is, as teasim, robosuite and others write them."""
 LEAST_SCATTER = 0.05
 """Least scatter of a number [its root mean square change in all steps]."""

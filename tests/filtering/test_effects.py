@@ -134,8 +134,10 @@ def test_a_log_shows_what_is_lacking_in_part(demos, share) -> None:
 
 
 def test_numbers_of_the_robot_are_known_by_their_names() -> None:
-    names = ("cube_x", "knob_in_right_hand_x", "robot0_eef_pos_0", "gripper_to_can_pos_x")
-    assert [bool(ROBOT.search(name)) for name in names] == [False, True, True, True]
+    robot = ("right_hand_x", "knob_in_left_hand_x", "robot0_eef_pos_0", "gripper_to_can_pos_x")
+    things = ("cube_x", "kettle_handle_x", "knob_angle")
+    assert all(ROBOT.search(name) for name in robot)
+    assert not any(ROBOT.search(name) for name in things)
 
 
 def test_without_pictures_the_log_of_the_environment_shows_what_has_no_effect(tmp_path) -> None:
