@@ -177,9 +177,11 @@ def basis(fitted: "DemoFilter") -> str:
             )
         return f"Judged by moments and found sub-tasks of the videos alone (camera {cameras})."
     if chosen.segmenter == "logged":
-        changed = ", and by what they change in the logged state of the environment"
+        if cameras or not fitted.effects_:
+            return "Judged by the logged sub-tasks."
         return (
-            f"Judged by the logged sub-tasks{changed if fitted.effects_ and not cameras else ''}."
+            "Judged by the logged sub-tasks, and by what they change in the logged state of the "
+            "environment."
         )
     if chosen.segmenter == "predictions":
         return "Judged by the predictions stored in the folder."

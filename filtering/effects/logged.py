@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.effects.rests import change_scales, changes, rest_features
-from filtering.effects.surprise import FEWEST_OTHERS, number_steps, spread_of
+from filtering.effects.surprise import FEWEST_OTHERS, MAD_TO_DEVIATION, number_steps, spread_of
 from teasim.common.arrays import Array
 from teasim.pool import Span
 from teasim.pool.lerobot.layout import ENVIRONMENT_STATE
@@ -30,8 +30,6 @@ ROBOT = re.compile(r"hand(?!le)|gripper|eef|tcp")
 """Names of numbers that say where the robot is, as teasim, robosuite and others write them."""
 LEAST_SCATTER = 0.05
 """Least scatter of a number [its root mean square change in all steps]."""
-MAD_TO_DEVIATION = 1.4826
-"""Standard deviation of a Gaussian [median absolute deviation]."""
 
 
 def log_surprises(

@@ -34,6 +34,8 @@ SPREAD_PRIOR, PRIOR_DEMOS = 0.5, 2.0
 """Prior scatter of a [usual effects], and its weight [demonstrations]."""
 FEWEST_OTHERS = 2
 """Least number of other demonstrations from which the usual change is taken."""
+MAD_TO_DEVIATION = 1.4826
+"""Standard deviation of a Gaussian [median absolute deviation]."""
 FAR = 2.0
 """Deviations are clipped to this many median deviations for the scatter C."""
 
@@ -113,6 +115,6 @@ def _precision(residuals: Array) -> Array:
 def spread_of(amounts: Array) -> float:
     """Return s from the amounts of the other demonstrations: their scatter about 1, and a prior."""
     known = amounts[np.isfinite(amounts)]
-    scatter = 1.4826 * float(np.median(np.abs(known - 1.0))) if len(known) else 0.0
+    scatter = MAD_TO_DEVIATION * float(np.median(np.abs(known - 1.0))) if len(known) else 0.0
     shrunk = (PRIOR_DEMOS * SPREAD_PRIOR**2 + len(known) * scatter**2) / (PRIOR_DEMOS + len(known))
     return float(np.sqrt(SPREAD_FLOOR**2 + shrunk))
