@@ -46,6 +46,11 @@ FEW_DEMOS = 4
 """Number of demonstrations up to which `caution` warns of the limits of the result."""
 TOO_SHORT = "Some videos are too short for moments, so that only the found sub-tasks are judged."
 """Note on a pool with videos of few moments."""
+NOT_THE_SAME = (
+    "The sub-tasks that the segmenter '{}' finds are not the same in all videos; those that "
+    "clustering finds are judged instead."
+)
+"""Note on a pool whose segmenter is not confirmed by the counterparts of moments."""
 ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features", "backbone")
 """Settings that need pictures."""
 
@@ -277,17 +282,18 @@ from the whole video.
     def _by_both(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:
         """Judge by sub-tasks and by moments; the graver verdict counts."""
         from filtering.judging.combined import CONFIRMED, combine, doubts, unless_alone
-        from filtering.moments.confirmed import confirmation
 
         by_segments = self._by_segments(pool, workers)
         if not seen.found:
             self._notes += (TOO_SHORT,)
             return self._cut(by_segments)
         by_moments, score = self._moments(pool, seen)
-        found = list(score.counterparts.values())
-        lengths = [episode.length for episode in pool.episodes]
-        labels = labels_at(self.segments_, lengths, found[0].lengths)
-        confirmed = max(confirmation(one, labels) for one in found)
+        confirmed = self._confirmed(pool, score)
+        if confirmed < CONFIRMED and self.chosen_.segmenter != CLUSTERING:
+            by_segments, confirmed = self._by_clusters(pool, score, workers) or (
+                by_segments,
+                confirmed,
+            )
         against = doubts(confirmed, score.one_order)
         self._notes += against
         self._knows_steps = confirmed >= CONFIRMED
@@ -295,6 +301,34 @@ from the whole video.
         if norm and self.chosen_.segmenter == CLUSTERING:
             norm = unless_alone(norm, score.strengths, score.kept)
         return self._cut(combine(norm, by_moments, pool.fps, self.config.groups))
+
+    def _confirmed(self, pool: Source, score: "MomentScore") -> float:
+        """Return how far the counterparts of moments confirm the segments, at most 1."""
+        from filtering.moments.confirmed import confirmation
+
+        found = list(score.counterparts.values())
+        lengths = [episode.length for episode in pool.episodes]
+        labels = labels_at(self.segments_, lengths, found[0].lengths)
+        return max(confirmation(one, labels) for one in found)
+
+    def _by_clusters(
+        self, pool: Source, score: "MomentScore", workers: Workers
+    ) -> tuple[Judgement, float] | None:
+        """Judge by sub-tasks of clustering in place of another segmenter's.
+
+        Returns the judgement and how far the sub-tasks are confirmed; None, and nothing is changed,
+        if they are not confirmed either.
+        """
+        from filtering.judging.combined import CONFIRMED
+
+        chosen, segments = self.chosen_, self.segments_
+        self.chosen_ = replace(chosen, segmenter=CLUSTERING)
+        judged, confirmed = self._by_segments(pool, workers), self._confirmed(pool, score)
+        if confirmed >= CONFIRMED:
+            self._notes += (NOT_THE_SAME.format(chosen.segmenter),)
+            return judged, confirmed
+        self.chosen_, self.segments_ = chosen, segments
+        return None
 
     def _by_moments(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:
         """Judge by counterparts between the videos; segments only serve to show."""

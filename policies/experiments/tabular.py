@@ -19,12 +19,15 @@ Rows = Sequence[Mapping[str, Any]]
 STYLE = (
     "body{font:15px/1.5 sans-serif;max-width:1200px;margin:2em auto;padding:0 1em}"
     "table{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}"
-    "th,td{border:1px solid #ccc;padding:2px 8px;text-align:left}"
+    "th,td{border:1px solid #ccc;padding:2px 8px;text-align:left;white-space:nowrap}"
+    "th{vertical-align:bottom;white-space:normal}summary{cursor:pointer;padding:.4em 0}"
     "pre{background:#f4f4f4;padding:.5em;overflow-x:auto}"
     "figure{display:inline-block;margin:0 1em 1em 0}figure img{max-width:min(540px,100%)}"
     "figcaption{font-size:12px;color:#56616a}"
 )
 """CSS of a page."""
+MOST_OPEN = 20
+"""Most rows of a table that a page shows before it is asked to."""
 
 
 def csv_text(rows: Rows) -> str:
@@ -53,7 +56,7 @@ def markdown_table(rows: Rows) -> str:
 
 
 def html_table(rows: Rows) -> str:
-    """Write rows as a table; empty without rows."""
+    """Write rows as a table, folded if it is long; empty without rows."""
     if not rows:
         return ""
     heads = "".join(f"<th>{escape(column)}</th>" for column in rows[0])
@@ -61,7 +64,10 @@ def html_table(rows: Rows) -> str:
         "<tr>" + "".join(f"<td>{escape(cell(value))}</td>" for value in row.values()) + "</tr>"
         for row in rows
     )
-    return f"<table><tr>{heads}</tr>{body}</table>"
+    table = f"<table><tr>{heads}</tr>{body}</table>"
+    if len(rows) <= MOST_OPEN:
+        return table
+    return f"<details><summary>All {len(rows)} rows</summary>{table}</details>"
 
 
 def html_page(title: str, parts: Sequence[str]) -> str:

@@ -6,10 +6,11 @@ whole therefore say what is usual for each other. The distance of two videos is 
 the log distances of the moments of that one which is found better in the other: what one of them
 leaves out or does at another time makes them look no different. Two clusters of average linkage
 (Sokal and Michener, 1958) look different where the mean distance between them exceeds that within
-them by LEAST_GAP, and are split again by the same rule.
+them by LEAST_GAP, and are split again by the same rule. What comes of a mistake may be seen until
+the end, as of an oven that was left on; so they have to differ in each third of the videos.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,10 +25,14 @@ Flags = NDArray[np.bool_]
 Looks = NDArray[np.int64]
 """(D,) the same number for demonstrations that look alike."""
 
-LEAST_GAP = 0.18
+LEAST_GAP = 0.16
 """Least difference of mean log distances between and within two looks. Where an arm comes from two
-sides (`garden`) it is 0.16 to 0.34, and elsewhere in the scenes TUNED_ON mostly below 0.15; with
-0.1 to 0.2 the verdicts on those scenes are nearly the same."""
+sides (`garden`) it is 0.17 to 0.34, and elsewhere in the scenes TUNED_ON mostly below 0.15."""
+PARTS = 3
+"""Parts of equal length of a video, in each of which two looks differ."""
+LEAST_GAP_OF_PART = 0.07
+"""Least such difference in each part. In `garden` it is 0.08 to 0.2; where other orders of steps
+make up the clusters (`lab`), or an oven was left on, it is below 0.06."""
 BEST = 0.25
 """Quantile of the log distances of two videos that tells how much they differ at all times."""
 FEWEST = 3
@@ -66,11 +71,10 @@ def looks_of(found: Counterparts) -> Looks:
     Those of a large pool that are no references have the look of the references that they are
     nearest to.
     """
-    far = np.stack([_distances(row) for row in found.there])
-    among = far[:, list(found.references)]
-    # A video is not compared with itself; its distance is never used.
-    among = np.where(np.isnan(among), 0.0, np.minimum(among, among.T))
-    clusters = list(_clusters(among, np.arange(len(among))))
+    far = _distances(found)
+    among = _among(found, far)
+    parts = np.stack([_among(found, _distances(found, part)) for part in range(PARTS)])
+    clusters = list(_clusters(among, parts, np.arange(len(among))))
     means = np.stack([np.nanmean(far[cluster], axis=0) for cluster in clusters])
     looks = means.argmin(axis=0)
     for look, cluster in enumerate(clusters):
@@ -78,15 +82,32 @@ def looks_of(found: Counterparts) -> Looks:
     return looks.astype(np.int64)
 
 
-def _distances(row: Sequence[Match | None]) -> NDArray[np.float64]:
-    return np.array([np.nan if match is None else np.quantile(match.near, BEST) for match in row])
+def _distances(found: Counterparts, part: int | None = None) -> NDArray[np.float64]:
+    """Return (R, D): how far each video is from the references, in all moments or one of PARTS."""
+
+    def distance(match: Match | None) -> float:
+        if match is None:
+            return np.nan
+        near = match.near if part is None else np.array_split(match.near, PARTS)[part]
+        return float(np.quantile(near, BEST)) if len(near) else np.nan
+
+    return np.array([[distance(match) for match in row] for row in found.there])
 
 
-def _clusters(far: NDArray[np.float64], members: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+def _among(found: Counterparts, far: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (R, R): how far the references are from each other; 0, never used, from itself."""
+    among = far[:, list(found.references)]
+    return np.where(np.isnan(among), 0.0, np.minimum(among, among.T))
+
+
+def _clusters(
+    far: NDArray[np.float64], parts: NDArray[np.float64], members: NDArray[np.int64]
+) -> Iterator[NDArray[np.int64]]:
     """Yield the clusters that some of the videos fall into.
 
     Args:
         far: (R, R) distances between all videos.
+        parts: (PARTS, R, R) the same in each part of the videos.
         members: (M,) the numbers of those that are looked at.
     """
     inside = far[np.ix_(members, members)]
@@ -94,13 +115,19 @@ def _clusters(far: NDArray[np.float64], members: NDArray[np.int64]) -> Iterator[
     if min(first.sum(), (~first).sum()) < FEWEST:
         yield members
         return
-    others = ~np.eye(len(members), dtype=np.bool_)
-    same = first[:, None] == first[None, :]
-    if inside[~same].mean() - inside[same & others].mean() < LEAST_GAP:
+    in_parts = [_gap(part[np.ix_(members, members)], first) for part in parts]
+    if _gap(inside, first) < LEAST_GAP or min(in_parts) < LEAST_GAP_OF_PART:
         yield members
         return
-    yield from _clusters(far, members[first])
-    yield from _clusters(far, members[~first])
+    yield from _clusters(far, parts, members[first])
+    yield from _clusters(far, parts, members[~first])
+
+
+def _gap(far: NDArray[np.float64], first: Flags) -> float:
+    """Return how much farther videos of two clusters are from each other than those of one."""
+    others = ~np.eye(len(far), dtype=np.bool_)
+    same = first[:, None] == first[None, :]
+    return float(far[~same].mean() - far[same & others].mean())
 
 
 def _half(far: NDArray[np.float64]) -> Flags:

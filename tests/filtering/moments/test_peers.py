@@ -44,6 +44,15 @@ def test_what_is_left_out_makes_no_look():
     assert set(looks_of(found_in(pool([0] * 10, orders)))) == {0}
 
 
+def test_what_is_seen_until_the_end_is_no_look_unless_it_was_there_from_the_beginning():
+    """What comes of a mistake, such as an oven left on, is no other way of looking."""
+    for begins, looks in ((0.3, 1), (0.0, 2)):
+        videos = pool([0] * 12)
+        for video in videos[1::3]:
+            video.looks[round(begins * len(video.looks)) :] += 2 * HAND[0]
+        assert len(set(looks_of(found_in(videos)))) == looks
+
+
 def test_videos_that_are_no_references_have_the_look_of_the_nearest():
     hands = [0, 1] * 6
     found = compare([video.looks for video in pool(hands)], [0, 1, 2, 3, 4, 5])

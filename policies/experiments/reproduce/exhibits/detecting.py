@@ -174,10 +174,11 @@ def table(plan: Plan, store: Store, name: str) -> Table:
 
 
 def figures(plan: Plan, store: Store, name: str) -> dict[str, Drawing]:
-    """Return the accuracy over k: of the default filter, of fitted segmenters, and baselines."""
+    """Return the accuracy over k: of the default filter, of fitted segmenters, and length."""
     shown = {"ours, from videos alone": (OURS, UNLABELLED)}
+    shown |= {f"ours, {SEGMENTERS[PEOPLE_LEVEL]}": (OURS, PEOPLE_LEVEL)}
     shown |= {f"norm, {SEGMENTERS[s]}": (NORM, s) for s in (PEOPLE_LEVEL, ROBOT_LEVEL)}
-    shown |= {f"{method}, told k": (method, PEOPLE_LEVEL) for method in ("length", "random")}
+    shown |= {"length, told k": ("length", PEOPLE_LEVEL)}
     series: dict[str, tuple[Point, ...]] = {}
     for title, (method, segmenter) in shown.items():
         points = []
