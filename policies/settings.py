@@ -166,7 +166,7 @@ class ReproduceSettings:
     out: Out
     """Folder for the results; an unfinished run in it is resumed."""
     quick: bool = False
-    """Do less of everything: all in about half an hour on two idle cores."""
+    """Do less of everything: all in about a quarter of an hour on two idle cores."""
     dry_run: bool = False
     """Only say what there is to do and about how long it takes."""
     salads: Path | None = None

@@ -173,10 +173,10 @@ def _judged(
     looks = {camera: looks_of(one) for camera, one in found.items()}
     strange = {camera: strange_in(one, looks[camera]) for camera, one in found.items()}
     evidence: dict[str, dict[str, Evidence]] = {}
-    kept: list[Array] = []  # known since the first round, which trusts everybody
+    kept: list[Array] = []  # of every round; the first one trusts everybody
 
     def values(trusted: Flags) -> list[Observed]:
-        moves = {}
+        moves, shares = {}, []
         for camera in cameras:
             peers = Peers(trusted, looks[camera])
             references = references_of(found[camera], peers)
@@ -184,12 +184,12 @@ def _judged(
                 found[camera], references, strange[camera], views[camera], peers
             )
             moves[camera] = moves_between(references)
-            if trusted.all():
-                kept.append(kept_orders(references, len(trusted)))
+            shares.append(kept_orders(references, len(trusted)))
+        kept.append(np.median(shares, axis=0))
         # Orders are free or not whoever looks; a camera that misses some steps sees less of it.
         variety = max(variety_of(far) for far in moves.values())
         return [
-            Observed({kind: evidence[camera][kind].values for kind in KINDS}, variety)
+            Observed({kind: evidence[camera][kind].values for kind in KINDS}, variety, kept[-1])
             for camera in cameras
         ]
 
@@ -209,7 +209,7 @@ def _judged(
         tuple(_in_order([finding(kind, d) for kind in KINDS]) for d in range(count)),
         found,
         structure,
-        kept=np.median(kept, axis=0),
+        kept=kept[0],
         looks=looks,
     )
 

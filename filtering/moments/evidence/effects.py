@@ -7,8 +7,9 @@ what usually changes here. A video has of it
 
     p_k = max over the neighbourhood of the cell of <x_k, m> / |m|,
 
-in a neighbourhood because no camera stands where another stood. With q the median of p over the
-trusted videos, the share that is not there is
+in a neighbourhood because things do not lie exactly where they lay; pictures of a camera that stood
+elsewhere are shifted as a whole before that. With q the median of p over the trusted videos, the
+share that is not there is
 
     (q - p_k) / (q + NOISE),
 
@@ -26,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, how_far
+from filtering.moments.evidence.offsets import offset_between, shifted_back
 from filtering.moments.evidence.peers import Flags, Peers
 from filtering.moments.evidence.stretches import Evidence, Stretch
 from filtering.moments.evidence.usual import VARIETY
@@ -55,6 +57,9 @@ STRIDE = 2
 """Every second moment is looked at."""
 OBSERVERS = 3
 """References from which is told where to look, the most central ones."""
+BEGINNING = 20
+"""First moments of a video, 4 s, in which little was done yet: by what lies where in their median
+the place of the camera is known."""
 STILL = 2
 """Moments on each side over which the median is taken."""
 BLUR = 0.7
@@ -143,18 +148,35 @@ def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evi
 
 def observe(found: Counterparts, videos: Sequence[Video]) -> list[View]:
     """Return what usually changes, seen from the most central references."""
-    states = {r: states_of(videos[r]) for r in found.references}
-    usual = {row: _usual_changes(found, row, states) for row in _central(found)}
-    amounts: dict[int, list[list[Amounts]]] = {row: [] for row in usual}
+    central = _central(found)
+    places = {row: beginning(states_of(videos[found.references[row]])) for row in central}
+    seen: dict[int, dict[int, States]] = {row: {} for row in central}
+    for r in found.references:
+        own = states_of(videos[r])
+        for row in central:
+            seen[row][r] = placed_as(places[row], own)
+    usual = {row: _usual_changes(found, row, seen[row]) for row in central}
+    amounts: dict[int, list[list[Amounts]]] = {row: [] for row in central}
     for d, video in enumerate(videos):
-        own = states[d] if d in states else states_of(video)
+        other = None if d in found.references else states_of(video)
         for row, changes in usual.items():
-            amounts[row].append([_amounts(u, own, found, row, d) for u in changes])
+            there = seen[row][d] if other is None else placed_as(places[row], other)
+            amounts[row].append([_amounts(u, there, found, row, d) for u in changes])
     return [
         View(row, tuple(changes), tuple(map(np.stack, zip(*amounts[row], strict=True))))
         for row, changes in usual.items()
         if changes
     ]
+
+
+def beginning(states: States) -> Change:
+    """Return (H, W, 3): what lies in each cell before anything is done."""
+    return np.asarray(np.median(states[:BEGINNING], axis=0), dtype=np.float32)
+
+
+def placed_as(place: Change, states: States) -> States:
+    """Return states as they are from the place of the camera that sees the beginning `place`."""
+    return shifted_back(states, offset_between(place, beginning(states)))
 
 
 def states_of(video: Video) -> States:

@@ -259,8 +259,9 @@ def test_large_pools_are_compared_with_central_videos_alone():
     assert len(compare(vectors, references).there[0]) == 40
 
 
-def observed(values, variety=0.0):
-    return Observed(dict.fromkeys(KINDS, np.asarray(values)), variety)
+def observed(values, variety=0.0, kept=None):
+    kept = np.ones(len(values)) if kept is None else np.asarray(kept)
+    return Observed(dict.fromkeys(KINDS, np.asarray(values)), variety, kept)
 
 
 def test_an_evidence_is_measured_against_its_pool():
@@ -280,6 +281,17 @@ def test_an_evidence_is_measured_against_the_trusted_alone():
     far = np.where(trusted, values, 50.0)
     expected = exceedances("missing", observed(values), trusted)
     assert np.array_equal(exceedances("missing", observed(far), trusted)[:4], expected[:4])
+
+
+def test_a_small_move_is_out_of_order_if_hardly_anybody_else_keeps_that_order():
+    everybody = np.ones(5, dtype=bool)
+    small = observed([0.01, 0.02, 0.01, 0.02, 0.12], kept=[1.0, 0.75, 1.0, 0.75, 0.25])
+    assert (exceedances("order", small, everybody) > 1).tolist() == [False] * 4 + [True]
+    assert not (exceedances("missing", small, everybody) > 1).any()
+    free = small._replace(kept=np.array([0.25, 0.5, 0.25, 0.5, 0.0]))
+    assert not (exceedances("order", free, everybody) > 1).any()
+    none = observed([0.01, 0.02, 0.01, 0.02, 0.03], kept=small.kept)
+    assert not (exceedances("order", none, everybody) > 1).any()
 
 
 def test_who_is_flagged_is_trusted_no_longer():
