@@ -105,7 +105,7 @@ def find_counterparts(vectors: Sequence[Vectors]) -> Counterparts:
     """Find the counterparts, with directions weighed by agreement.
 
     Args:
-        vectors: per video (n, K), see `vectors.moment_vectors`.
+        vectors: per video (n, K), see `vectors.Blocks`.
     """
     references = choose_references(vectors)
     among = compare([vectors[r] for r in references], range(len(references)))
@@ -152,10 +152,10 @@ def choose_references(vectors: Sequence[Vectors]) -> tuple[int, ...]:
     if count <= MOST_REFERENCES:
         return tuple(range(count))
     order = sorted(range(count), key=lambda d: (len(vectors[d]), float(np.abs(vectors[d]).sum())))
-    found = compare(vectors, _spread(order, SCOUTS))
+    found = compare(vectors, spread(order, SCOUTS))
     far = [how_far(row[d] for row in found.back) for d in range(count)]
     limit = float(np.quantile(far, TRUSTED))
-    return tuple(sorted(_spread([d for d in order if far[d] <= limit], MOST_REFERENCES)))
+    return tuple(sorted(spread([d for d in order if far[d] <= limit], MOST_REFERENCES)))
 
 
 def how_far(matches: Iterable[Match | None]) -> float:
@@ -163,7 +163,8 @@ def how_far(matches: Iterable[Match | None]) -> float:
     return float(np.median([np.median(match.near) for match in matches if match is not None]))
 
 
-def _spread(numbers: Sequence[int], count: int) -> list[int]:
+def spread(numbers: Sequence[int], count: int) -> list[int]:
+    """Return `count` of the numbers at equal distances, or all if there are fewer."""
     places = np.linspace(0, len(numbers) - 1, min(count, len(numbers))).round().astype(int)
     return [numbers[place] for place in places]
 

@@ -76,7 +76,7 @@ class MomentScore:
     counterparts: Mapping[str, Counterparts]
     """Per camera that was of use."""
     structure: Mapping[str, float]
-    """Per camera how much the videos have in common, see `suitable.shared_structure`."""
+    """Per camera how much the videos have in common, see `structure.shared_structure`."""
     kept: Array
     """(D,) share of the others whose order a demonstration keeps, as most cameras see it."""
     looks: Mapping[str, Looks]

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from filtering.moments.counterparts import ROUND_TRIP, Counterparts, find_counterparts
-from filtering.moments.vectors import Video, moment_vectors
+from filtering.moments.counterparts import Counterparts, find_counterparts
+from filtering.moments.structure import shared_structure
+from filtering.moments.vectors import Video
+from filtering.moments.weighing import weighed_vectors
 from teasim.common.errors import ConfigError
 
 FEWEST_VIDEOS = 3
@@ -66,7 +68,7 @@ def comparable(cameras: Mapping[str, Sequence[Video]]) -> Comparable:
         return Comparable(moving, {}, {}, notes)
     # The matrices are small: more BLAS threads only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = {name: find_counterparts(moment_vectors(seen)) for name, seen in moving.items()}
+        found = {name: find_counterparts(weighed_vectors(seen)) for name, seen in moving.items()}
         structure = {camera: shared_structure(one) for camera, one in found.items()}
     useful = {c: one for c, one in found.items() if structure[c] >= LEAST_RETURN}
     if not useful:
@@ -110,33 +112,3 @@ def sees_motion(videos: Sequence[Video]) -> bool:
     """Tell whether a camera sees anything happen."""
     varies = [video.cells.astype(np.float32).std(axis=0).max() for video in videos]
     return float(np.median(varies)) >= LEAST_VARIATION
-
-
-def shared_structure(found: Counterparts) -> float:
-    """Return how many more moments return from a round trip than by chance, at most 1.
-
-    That is (r - c) / (1 - c) in the median pair of videos, with the share r of the moments that
-    return, and the share c that a place drawn at random would be near enough to. Videos of few
-    moments have a large c.
-    """
-    shares = []
-    for row, back in zip(found.there, found.back, strict=True):
-        for there, returned in zip(row, back, strict=True):
-            if there is None or returned is None:
-                continue
-            count = len(there.nearest)
-            # Places that are contested would make even noise agree.
-            missed = np.abs(returned.nearest[there.nearest] - np.arange(count))
-            usual = _share_near(count)
-            shares.append(((missed <= ROUND_TRIP).mean() - usual) / (1 - usual))
-    return float(np.median(shares))
-
-
-def _share_near(count: int) -> float:
-    """Return the share of pairs of `count` moments that are at most ROUND_TRIP apart, below 1.
-
-    There are count - k pairs of moments that are k apart, in either order; `count` is at least
-    FEWEST_MOMENTS.
-    """
-    near = count + 2 * sum(count - apart for apart in range(1, ROUND_TRIP + 1))
-    return near / count**2

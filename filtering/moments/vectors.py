@@ -2,10 +2,11 @@
 
 Two things are seen in a moment: how it looks (pooled maps of the backbone) and what lies where
 (cells of the picture). Each is scaled within its video, which takes out its light and camera, and
-reduced to the main directions of the pool. `agreeing` then weighs directions by how well the videos
-agree in them where they show the same: what is placed at random, who demonstrates and what else
-moves in the picture differs between counterparts and counts little. This is relevant component
-analysis (Bar-Hillel et al., 2005) with counterparts in place of labelled chunklets.
+reduced to the main directions of the pool; `weighing` says how much looks count beside places.
+`agreeing` then weighs directions by how well the videos agree in them where they show the same:
+what is placed at random, who demonstrates and what else moves in the picture differs between
+counterparts and counts little. This is relevant component analysis (Bar-Hillel et al., 2005) with
+counterparts in place of labelled chunklets.
 """
 
 from collections.abc import Iterable, Sequence
@@ -44,11 +45,26 @@ class Video:
         return len(self.looks)
 
 
-def moment_vectors(videos: Sequence[Video]) -> list[Vectors]:
-    """Return per video (n, K): looks and places side by side, of equal total variance."""
+@dataclass(frozen=True)
+class Blocks:
+    """The two parts of the vectors of a pool, of equal total variance."""
+
+    looks: tuple[Array, ...]
+    """Per video (n, DIRECTIONS) or less, how its moments look."""
+    places: tuple[Array, ...]
+    """Per video (n, DIRECTIONS) or less, what lies where."""
+
+    def vectors(self, weight: float = 1.0) -> list[Vectors]:
+        """Return per video (n, K): looks, times `weight`, and places side by side."""
+        pairs = zip(self.looks, self.places, strict=True)
+        return [np.hstack((weight * look, place)).astype(np.float32) for look, place in pairs]
+
+
+def moment_blocks(videos: Sequence[Video]) -> Blocks:
+    """Return looks and places of the moments of a pool's videos."""
     looks = _main_directions([_scaled(video.looks) for video in videos])
     places = _main_directions([_places(video.cells) for video in videos])
-    return [np.hstack(blocks).astype(np.float32) for blocks in zip(looks, places, strict=True)]
+    return Blocks(tuple(looks), tuple(places))
 
 
 def agreeing(vectors: Sequence[Vectors], differences: Iterable[Vectors]) -> list[Vectors]:

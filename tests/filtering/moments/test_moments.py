@@ -22,7 +22,7 @@ from filtering.moments.evidence.stretches import peak, worst
 from filtering.moments.evidence.usual import moved, usual_of
 from filtering.moments.score import score_moments
 from filtering.moments.suitable import comparable
-from filtering.moments.vectors import Video, moment_vectors
+from filtering.moments.vectors import Video, moment_blocks
 from filtering.moments.windows import PACES, window_distances
 from teasim.common.errors import ConfigError
 from tests.filtering.moments.toy_videos import LENGTH, STEPS, toy_video, usual_videos
@@ -64,7 +64,7 @@ def test_window_distances_are_sums_along_the_pace_that_fits_best():
 
 
 def test_a_video_is_its_own_counterpart():
-    video = moment_vectors(usual_videos(3))
+    video = moment_blocks(usual_videos(3)).vectors()
     found = compare([video[0], video[0].copy()], (0, 1))
     match = found.there[0][1]
     assert match is not None
@@ -394,7 +394,7 @@ def test_states_do_not_depend_on_the_light():
 def test_borders_of_agreed_stretches_lie_where_orders_differ():
     orders = [[0, 1, 2, 3, 4], [0, 2, 1, 3, 4], [0, 1, 2, 3, 4], [0, 2, 1, 3, 4]] * 2
     videos = [toy_video(order, seed) for seed, order in enumerate(orders)]
-    agreed = agree(find_counterparts(moment_vectors(videos)))
+    agreed = agree(find_counterparts(moment_blocks(videos).vectors()))
     assert agreed.borders
     assert all(0 < share <= 1 for share in agreed.borders)
     near = [min(abs(s.start - k * LENGTH) for s in agreed.stretches[1:]) for k in (1, 3)]
