@@ -53,7 +53,7 @@ SCATTER: Mapping[str, float] = MappingProxyType(
 FEWER = 0.45
 """How much less than the usual share of the others, the median of the trusted, must keep the same
 order as a demonstration. Among ten of one order and three of another, those of the scenes TUNED_ON
-that keep it are at most 0.3 below the median, but for three in a hundred."""
+that keep it are at most 0.3 below the median, but for one in a hundred."""
 WITNESS = 0.6
 """Evidence of order from which such a demonstration is flagged. Where counterparts are often wrong
 (`drawers`), correct ones seem to keep the order of nobody, but nothing else tells against them."""
