@@ -288,12 +288,7 @@ from the whole video.
             self._notes += (TOO_SHORT,)
             return self._cut(by_segments)
         by_moments, score = self._moments(pool, seen)
-        confirmed = self._confirmed(pool, score)
-        if confirmed < CONFIRMED and self.chosen_.segmenter != CLUSTERING:
-            by_segments, confirmed = self._by_clusters(pool, score, workers) or (
-                by_segments,
-                confirmed,
-            )
+        by_segments, confirmed = self._by_confirmed(pool, by_segments, score, workers)
         against = doubts(confirmed, score.one_order)
         self._notes += against
         self._knows_steps = confirmed >= CONFIRMED
@@ -311,24 +306,26 @@ from the whole video.
         labels = labels_at(self.segments_, lengths, found[0].lengths)
         return max(confirmation(one, labels) for one in found)
 
-    def _by_clusters(
-        self, pool: Source, score: "MomentScore", workers: Workers
-    ) -> tuple[Judgement, float] | None:
-        """Judge by sub-tasks of clustering in place of another segmenter's.
+    def _by_confirmed(
+        self, pool: Source, by_segments: Judgement, score: "MomentScore", workers: Workers
+    ) -> tuple[Judgement, float]:
+        """Return the judgement by sub-tasks, and how far counterparts confirm these.
 
-        Returns the judgement and how far the sub-tasks are confirmed; None, and nothing is changed,
-        if they are not confirmed either.
+        Sub-tasks of another segmenter that are not confirmed give way to those of clustering, if
+        these are.
         """
         from filtering.judging.combined import CONFIRMED
 
-        chosen, segments = self.chosen_, self.segments_
+        chosen, segments, confirmed = self.chosen_, self.segments_, self._confirmed(pool, score)
+        if confirmed >= CONFIRMED or chosen.segmenter == CLUSTERING:
+            return by_segments, confirmed
         self.chosen_ = replace(chosen, segmenter=CLUSTERING)
-        judged, confirmed = self._by_segments(pool, workers), self._confirmed(pool, score)
-        if confirmed >= CONFIRMED:
+        by_clusters, again = self._by_segments(pool, workers), self._confirmed(pool, score)
+        if again >= CONFIRMED:
             self._notes += (NOT_THE_SAME.format(chosen.segmenter),)
-            return judged, confirmed
+            return by_clusters, again
         self.chosen_, self.segments_ = chosen, segments
-        return None
+        return by_segments, confirmed
 
     def _by_moments(self, pool: Source, seen: "Comparable", workers: Workers) -> Judgement:
         """Judge by counterparts between the videos; segments only serve to show."""

@@ -151,7 +151,7 @@ def choose_references(vectors: Sequence[Vectors]) -> tuple[int, ...]:
     count = len(vectors)
     if count <= MOST_REFERENCES:
         return tuple(range(count))
-    order = sorted(range(count), key=lambda d: (len(vectors[d]), float(np.abs(vectors[d]).sum())))
+    order = by_content(vectors)
     found = compare(vectors, spread(order, SCOUTS))
     far = [how_far(row[d] for row in found.back) for d in range(count)]
     limit = float(np.quantile(far, TRUSTED))
@@ -161,6 +161,13 @@ def choose_references(vectors: Sequence[Vectors]) -> tuple[int, ...]:
 def how_far(matches: Iterable[Match | None]) -> float:
     """Return how far a video is from others: the median of the median log distances."""
     return float(np.median([np.median(match.near) for match in matches if match is not None]))
+
+
+def by_content(vectors: Sequence[Vectors]) -> list[int]:
+    """Return the numbers of the videos in an order that does not depend on that of the pool."""
+    return sorted(
+        range(len(vectors)), key=lambda d: (len(vectors[d]), float(np.abs(vectors[d]).sum()))
+    )
 
 
 def spread(numbers: Sequence[int], count: int) -> list[int]:

@@ -8,9 +8,9 @@ pool, and how much its demonstrations scatter, s, because where people differ al
     strength = (sum over kinds of z_k^3)^(1/3)
     logit p  = STEEPNESS (strength - 1)
 
-Few moments pass each other where a short step is moved, but it is moved in the eyes of nearly all.
-Evidence of order that does not reach the cut therefore counts more if the demonstration keeps the
-order of fewer others than is usual, f, in units of FEWER: z is then max(z, min(f, z / WITNESS)).
+Where a short step is moved, few moments pass each other, though they do so in nearly all pairs of
+videos. Evidence of order therefore counts more if a demonstration keeps the order of fewer others
+than is usual: with f the difference in units of FEWER, z becomes max(z, min(f, z / WITNESS)).
 
 A demonstration of strength 1 is as probably incorrect as correct. The exponent lets one clear kind
 of evidence outweigh several weak ones. Everybody is trusted at first. Gross mistakes hide small
@@ -56,7 +56,8 @@ order as a demonstration. Among ten of one order and three of another, those of 
 that keep it are at most 0.3 below the median, but for one in a hundred."""
 WITNESS = 0.6
 """Evidence of order from which such a demonstration is flagged. Where counterparts are often wrong
-(`drawers`), correct ones seem to keep the order of nobody, but nothing else tells against them."""
+(`drawers`), correct ones seem to keep the order of hardly any other; nothing else speaks against
+them."""
 STEEPNESS = 5.0
 """How fast the logit of the probability rises with the strength; of the size that a logistic
 regression on the same pools gives."""

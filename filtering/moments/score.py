@@ -176,18 +176,18 @@ def _judged(
     kept: list[Array] = []  # of every round; the first one trusts everybody
 
     def values(trusted: Flags) -> list[Observed]:
-        moves, shares = {}, []
+        moves, shares = list[Array](), list[Array]()
         for camera in cameras:
             peers = Peers(trusted, looks[camera])
             references = references_of(found[camera], peers)
             evidence[camera] = gather(
                 found[camera], references, strange[camera], views[camera], peers
             )
-            moves[camera] = moves_between(references)
-            shares.append(kept_orders(references, len(trusted)))
+            moves.append(moves_between(references))
+            shares.append(kept_orders(references, moves[-1], len(trusted)))
         kept.append(np.median(shares, axis=0))
         # Orders are free or not whoever looks; a camera that misses some steps sees less of it.
-        variety = max(variety_of(far) for far in moves.values())
+        variety = max(variety_of(far) for far in moves)
         return [
             Observed({kind: evidence[camera][kind].values for kind in KINDS}, variety, kept[-1])
             for camera in cameras

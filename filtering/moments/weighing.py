@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from filtering.moments.counterparts import find_counterparts, spread
+from filtering.moments.counterparts import by_content, find_counterparts, spread
 from filtering.moments.structure import shared_structure
 from filtering.moments.vectors import Vectors, Video, moment_blocks
 
@@ -24,10 +24,8 @@ SCOUTS = 8
 def weighed_vectors(videos: Sequence[Video]) -> list[Vectors]:
     """Return per video (n, K) the vectors of its moments, looks weighed by agreement."""
     blocks = moment_blocks(videos)
-    plain = blocks.vectors()
-    order = sorted(range(len(plain)), key=lambda d: (len(plain[d]), float(np.abs(plain[d]).sum())))
-    scouts = spread(order, SCOUTS)
-    best, most = plain, -np.inf
+    best = blocks.vectors()
+    scouts, most = spread(by_content(best), SCOUTS), -np.inf
     for weight in WEIGHTS:
         vectors = blocks.vectors(weight)
         structure = shared_structure(find_counterparts([vectors[scout] for scout in scouts]))

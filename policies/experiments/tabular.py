@@ -26,8 +26,6 @@ STYLE = (
     "figcaption{font-size:12px;color:#56616a}"
 )
 """CSS of a page."""
-MOST_OPEN = 20
-"""Most rows of a table that a page shows before it is asked to."""
 
 
 def csv_text(rows: Rows) -> str:
@@ -56,7 +54,7 @@ def markdown_table(rows: Rows) -> str:
 
 
 def html_table(rows: Rows) -> str:
-    """Write rows as a table, folded if it is long; empty without rows."""
+    """Write rows as a table; empty without rows."""
     if not rows:
         return ""
     heads = "".join(f"<th>{escape(column)}</th>" for column in rows[0])
@@ -64,10 +62,7 @@ def html_table(rows: Rows) -> str:
         "<tr>" + "".join(f"<td>{escape(cell(value))}</td>" for value in row.values()) + "</tr>"
         for row in rows
     )
-    table = f"<table><tr>{heads}</tr>{body}</table>"
-    if len(rows) <= MOST_OPEN:
-        return table
-    return f"<details><summary>All {len(rows)} rows</summary>{table}</details>"
+    return f"<table><tr>{heads}</tr>{body}</table>"
 
 
 def html_page(title: str, parts: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from filtering.config import FilterConfig
 from policies.cli import reproduce
 from policies.experiments.reproduce import plan as plans
 from policies.experiments.reproduce import run
-from policies.experiments.reproduce.exhibits.exhibit import as_html, as_markdown
+from policies.experiments.reproduce.exhibits.exhibit import MOST_OPEN, as_html, as_markdown
 from policies.experiments.reproduce.exhibits.policies import config_of
 from policies.experiments.reproduce.methods import NORM, OURS
 from policies.experiments.reproduce.paper import DETECTION, precision_sentence
@@ -79,6 +79,8 @@ def test_every_exhibit_has_rows_sentences_and_files(store, name):
     rows = list(csv.DictReader(csv_text(table.rows).splitlines()))
     assert len(rows) == len(table.rows)
     assert text.count("\n| ") == len(rows) + 2
+    assert page.count("<tr>") == len(rows) + 1
+    assert (f"<summary>All {len(rows)} rows</summary>" in page) == (len(rows) > MOST_OPEN)
 
 
 @pytest.mark.parametrize("name", ["table2", "table3"])

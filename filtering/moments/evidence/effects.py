@@ -148,17 +148,16 @@ def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evi
 
 def observe(found: Counterparts, videos: Sequence[Video]) -> list[View]:
     """Return what usually changes, seen from the most central references."""
-    central = _central(found)
-    places = {row: beginning(states_of(videos[found.references[row]])) for row in central}
-    seen: dict[int, dict[int, States]] = {row: {} for row in central}
-    for r in found.references:
-        own = states_of(videos[r])
-        for row in central:
-            seen[row][r] = placed_as(places[row], own)
-    usual = {row: _usual_changes(found, row, seen[row]) for row in central}
-    amounts: dict[int, list[list[Amounts]]] = {row: [] for row in central}
+    states = {r: states_of(videos[r]) for r in found.references}
+    places = {row: beginning(states[found.references[row]]) for row in _central(found)}
+    seen = {
+        row: {r: placed_as(place, own) for r, own in states.items()}
+        for row, place in places.items()
+    }
+    usual = {row: _usual_changes(found, row, seen[row]) for row in seen}
+    amounts: dict[int, list[list[Amounts]]] = {row: [] for row in usual}
     for d, video in enumerate(videos):
-        other = None if d in found.references else states_of(video)
+        other = None if d in states else states_of(video)
         for row, changes in usual.items():
             there = seen[row][d] if other is None else placed_as(places[row], other)
             amounts[row].append([_amounts(u, there, found, row, d) for u in changes])

@@ -37,14 +37,9 @@ def offset_between(one: Picture, other: Picture) -> Offset:
         return Offset(0, 0)
     inner = one[FARTHEST : height - FARTHEST, FARTHEST : width - FARTHEST]
     reach = range(-FARTHEST, FARTHEST + 1)
-    apart = {
-        offset: _difference(inner, other, offset)
-        for offset in sorted(
-            (Offset(down, right) for down in reach for right in reach),
-            key=lambda offset: (abs(offset.down) + abs(offset.right), offset),
-        )
-    }
-    least = min(apart, key=lambda offset: apart[offset])
+    offsets = [Offset(down, right) for down in reach for right in reach]
+    apart = {offset: _difference(inner, other, offset) for offset in offsets}
+    least = min(offsets, key=lambda offset: (apart[offset], abs(offset.down) + abs(offset.right)))
     return least if apart[least] < BETTER * apart[Offset(0, 0)] else Offset(0, 0)
 
 

@@ -30,16 +30,17 @@ def moves_between(references: Sequence[Reference]) -> Array:
     return np.fmin(moves, moves.T)
 
 
-def kept_orders(references: Sequence[Reference], count: int) -> Array:
+def kept_orders(references: Sequence[Reference], between: Array, count: int) -> Array:
     """Return (D,): share of the other trusted references whose order each demonstration keeps.
 
     Args:
         references: what is usual.
+        between: (R, R) see `moves_between`.
         count: D, the number of demonstrations.
     """
     trusted = [reference for reference in references if reference.trusted]
     moves = np.array([[one.move(d) for d in range(count)] for one in trusted])
-    moves[:, [one.number for one in trusted]] = moves_between(references)
+    moves[:, [one.number for one in trusted]] = between
     return np.asarray(np.nanmean(_in_one_order(moves), axis=0))
 
 

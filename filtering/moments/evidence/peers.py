@@ -10,7 +10,7 @@ them by LEAST_GAP, and are split again by the same rule. What comes of a mistake
 the end, as of an oven that was left on; so they have to differ in each third of the videos.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,9 +71,10 @@ def looks_of(found: Counterparts) -> Looks:
     Those of a large pool that are no references have the look of the references that they are
     nearest to.
     """
-    far = _distances(found)
-    among = _among(found, far)
-    parts = np.stack([_among(found, _distances(found, part)) for part in range(PARTS)])
+    far = _distances(found.there)
+    rows = [[row[r] for r in found.references] for row in found.there]
+    among = _mutual(far[:, list(found.references)])
+    parts = np.stack([_mutual(_distances(rows, part)) for part in range(PARTS)])
     clusters = list(_clusters(among, parts, np.arange(len(among))))
     means = np.stack([np.nanmean(far[cluster], axis=0) for cluster in clusters])
     looks = means.argmin(axis=0)
@@ -82,8 +83,10 @@ def looks_of(found: Counterparts) -> Looks:
     return looks.astype(np.int64)
 
 
-def _distances(found: Counterparts, part: int | None = None) -> NDArray[np.float64]:
-    """Return (R, D): how far each video is from the references, in all moments or one of PARTS."""
+def _distances(
+    rows: Sequence[Sequence[Match | None]], part: int | None = None
+) -> NDArray[np.float64]:
+    """Return (R, K): how far K videos are from R references, in all moments or one of PARTS."""
 
     def distance(match: Match | None) -> float:
         if match is None:
@@ -91,13 +94,12 @@ def _distances(found: Counterparts, part: int | None = None) -> NDArray[np.float
         near = match.near if part is None else np.array_split(match.near, PARTS)[part]
         return float(np.quantile(near, BEST)) if len(near) else np.nan
 
-    return np.array([[distance(match) for match in row] for row in found.there])
+    return np.array([[distance(match) for match in row] for row in rows])
 
 
-def _among(found: Counterparts, far: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (R, R): how far the references are from each other; 0, never used, from itself."""
-    among = far[:, list(found.references)]
-    return np.where(np.isnan(among), 0.0, np.minimum(among, among.T))
+def _mutual(far: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (R, R): the lesser of the distances of two references; 0, never used, from itself."""
+    return np.where(np.isnan(far), 0.0, np.minimum(far, far.T))
 
 
 def _clusters(

@@ -10,6 +10,9 @@ from policies.experiments.tabular import Rows, html_table, markdown_table
 from policies.experiments.units import Store, Unit
 from teasim.common.figures import Drawing
 
+MOST_OPEN = 20
+"""Most rows of a table that a page shows before it is asked to."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -76,5 +79,12 @@ def as_html(
         f"<figcaption>{escape(Path(path).stem)}</figcaption></figure>"
         for path in figures
     )
-    parts += [f"<ul>{items}</ul>", pictures, html_table(table.rows), notes]
+    parts += [f"<ul>{items}</ul>", pictures, _folded(table.rows), notes]
     return "\n".join([*parts, "</section>"])
+
+
+def _folded(rows: Rows) -> str:
+    """Write rows as a table in HTML, folded if it is long."""
+    if len(rows) <= MOST_OPEN:
+        return html_table(rows)
+    return f"<details><summary>All {len(rows)} rows</summary>{html_table(rows)}</details>"
