@@ -344,13 +344,19 @@ from the whole video.
         self, pool: Source, seen: "Comparable", groups: str = "auto"
     ) -> "tuple[Judgement, MomentScore]":
         # Imported here because step lists need neither torch nor videos.
-        from filtering.judging.moments import Timeline, judge_moments, told_of_looks
+        from filtering.judging.moments import (
+            Timeline,
+            judge_moments,
+            told_of_actors,
+            told_of_looks,
+        )
 
         episodes = pool.episodes
         timeline = Timeline([e.length for e in episodes], [e.name for e in episodes], pool.fps)
         with self._timed("moments"):
             judgement, score = judge_moments(seen, timeline, groups)
         self._notes += told_of_looks(score.looks, timeline.names)
+        self._notes += told_of_actors(score.actors, timeline.names)
         return judgement, score
 
     def _cut(self, judgement: Judgement) -> Judgement:

@@ -1,6 +1,6 @@
 """Judge a pool by moments of its videos: the score `moments` in the form of every other score."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from filtering.judging.explain import Clock, Counterpart, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.thresholds import Grouping, as_many_as_asked
-from filtering.moments.evidence.peers import Looks
+from filtering.moments.evidence.effects import FEWEST_ALIKE
 from filtering.moments.evidence.stretches import Stretch
+from filtering.moments.peers.peers import Looks
 from filtering.moments.score import MomentFinding, MomentScore, score_comparable
 from filtering.moments.suitable import Comparable
 from filtering.vision.frame_features import sampled_frames
@@ -96,18 +97,40 @@ def told_of_looks(looks: Mapping[str, Looks], names: Sequence[str]) -> tuple[str
         looks: per camera (D,) the same number for demonstrations that look alike.
         names: (D,) what a person calls the demonstrations.
     """
-    told = []
+    return tuple(
+        f"Camera {camera} sees {members} in another way at all times: what is usual among them is "
+        "no evidence."
+        for camera, members, _ in _uncommon(looks, names)
+    )
+
+
+def told_of_actors(actors: Mapping[str, Looks], names: Sequence[str]) -> tuple[str, ...]:
+    """Return a sentence per hand or tool that is not the commonest one of its camera.
+
+    Args:
+        actors: per camera (D,) the same number where what moves has the same colours.
+        names: (D,) what a person calls the demonstrations.
+    """
+    return tuple(
+        f"In {members} camera {camera} sees what moves in other colours, as of another hand: "
+        + (
+            "what is usual among them is no evidence."
+            if count > FEWEST_ALIKE
+            else "they are too few to say that a step of theirs had no effect."
+        )
+        for camera, members, count in _uncommon(actors, names)
+    )
+
+
+def _uncommon(looks: Mapping[str, Looks], names: Sequence[str]) -> Iterator[tuple[str, str, int]]:
+    """Yield the camera, the members in words and their number of every look but the commonest."""
     for camera, of in looks.items():
         numbers, counts = np.unique(of, return_counts=True)
         for number in numbers[np.argsort(-counts, kind="stable")][1:]:
             members = [name for name, own in zip(names, of, strict=True) if own == number]
             more = f" and {len(members) - MOST_NAMED} more" if len(members) > MOST_NAMED else ""
-            told.append(
-                f"Camera {camera} sees {len(members)} of {len(names)} in another way at all times "
-                f"({', '.join(members[:MOST_NAMED])}{more}): what is usual among them is no "
-                "evidence."
-            )
-    return tuple(told)
+            named = f"{', '.join(members[:MOST_NAMED])}{more}"
+            yield camera, f"{len(members)} of {len(names)} ({named})", len(members)
 
 
 def reason(finding: MomentFinding, counts: Sequence[int], timeline: Timeline) -> str:

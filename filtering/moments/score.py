@@ -19,13 +19,13 @@ from filtering.moments.decision import (
     strengths_of,
     telling,
 )
-from filtering.moments.evidence.effects import View, ineffective, observe
+from filtering.moments.evidence.effects import Effects, ineffective, observe
 from filtering.moments.evidence.kinds import missing_order_extra
 from filtering.moments.evidence.orders import kept_orders, moves_between, variety_of
-from filtering.moments.evidence.peers import Flags, Looks, Peers, looks_of
 from filtering.moments.evidence.strange import Strange, strange_in
 from filtering.moments.evidence.stretches import Evidence, Stretch
 from filtering.moments.evidence.usual import Reference, references_of
+from filtering.moments.peers.peers import Flags, Looks, Peers, both, looks_of
 from filtering.moments.suitable import Comparable, check_videos, comparable
 from filtering.moments.vectors import Video
 from filtering.vision.frame_features import FrameSource, frame_features
@@ -81,6 +81,8 @@ class MomentScore:
     """(D,) share of the others whose order a demonstration keeps, as most cameras see it."""
     looks: Mapping[str, Looks]
     """Per camera (D,) the same number for demonstrations that look alike."""
+    actors: Mapping[str, Looks]
+    """Per camera (D,) the same number where what moves has the same colours."""
 
     @property
     def one_order(self) -> float:
@@ -144,34 +146,44 @@ def score_comparable(seen: Comparable) -> MomentScore:
     check_videos(seen.videos)
     # The matrices are small: more BLAS threads only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        views = {camera: observe(one, seen.videos[camera]) for camera, one in seen.found.items()}
-        return _judged(seen.found, views, seen.structure)
+        effects = {camera: observe(one, seen.videos[camera]) for camera, one in seen.found.items()}
+        return _judged(seen.found, effects, seen.structure)
 
 
 def gather(
     found: Counterparts,
     references: Sequence[Reference],
     strange: Sequence[Strange],
-    views: Sequence[View],
+    effects: Effects,
     peers: Peers,
 ) -> dict[str, Evidence]:
-    """Return the evidence of every kind that one camera gives, measured by the peers."""
+    """Return the evidence of every kind that one camera gives, measured by the peers.
+
+    Args:
+        found: the counterparts.
+        references: what is usual among the peers.
+        strange: how strange the moments of each demonstration are.
+        effects: what usually changes, and who acts.
+        peers: who says what is usual, whoever acts.
+    """
+    same_hand = peers.told_apart(effects.actors)
+    alike = references_of(found, same_hand) if effects.actors.any() else references
     kinds = (
-        *missing_order_extra(references, strange),
-        ineffective(found, views, peers),
+        *missing_order_extra(alike, references, strange),
+        ineffective(found, effects.views, same_hand),
     )
     return dict(zip(KINDS, kinds, strict=True))
 
 
 def _judged(
     found: Mapping[str, Counterparts],
-    views: Mapping[str, Sequence[View]],
+    effects: Mapping[str, Effects],
     structure: Mapping[str, float],
 ) -> MomentScore:
     """Put cameras and kinds together."""
     cameras = list(found)
     looks = {camera: looks_of(one) for camera, one in found.items()}
-    strange = {camera: strange_in(one, looks[camera]) for camera, one in found.items()}
+    strange = {c: strange_in(one, both(looks[c], effects[c].actors)) for c, one in found.items()}
     evidence: dict[str, dict[str, Evidence]] = {}
     kept: list[Array] = []  # of every round; the first one trusts everybody
 
@@ -181,7 +193,7 @@ def _judged(
             peers = Peers(trusted, looks[camera])
             references = references_of(found[camera], peers)
             evidence[camera] = gather(
-                found[camera], references, strange[camera], views[camera], peers
+                found[camera], references, strange[camera], effects[camera], peers
             )
             moves.append(moves_between(references))
             shares.append(kept_orders(references, moves[-1], len(trusted)))
@@ -211,6 +223,7 @@ def _judged(
         structure,
         kept=kept[0],
         looks=looks,
+        actors={camera: one.actors for camera, one in effects.items()},
     )
 
 

@@ -5,19 +5,22 @@ before and after, x_k(t): cells REACH moments later minus REACH moments earlier.
 by, so that a median over a few moments takes them out. m(t), the median of x_k over the videos, is
 what usually changes here. A video has of it
 
-    p_k = max over the neighbourhood of the cell of <x_k, m> / |m|,
+    p_k = max over the neighbourhood of the cell of <x_k, m> / |m| and OTHER_COLOUR |x_k|,
 
 in a neighbourhood because things do not lie exactly where they lay; pictures of a camera that stood
-elsewhere are shifted as a whole before that. With q the median of p over the trusted videos, the
-share that is not there is
+elsewhere are shifted as a whole before that. What changes into another colour counts for less: a
+hand of another skin or sleeve is not a step without effect. With q the median of p over the trusted
+videos, the share that is not there is
 
     (q - p_k) / (q + NOISE),
 
-1 where nothing came of it and near 0 where it is as usual. Its mean over the cells that lack most
-becomes the logarithm of the share that is there; what the quantile 1 - VARIETY of the trusted
-videos lack at the same moment, because hands cover it or things lie elsewhere, is taken off. Only
-changes that most videos show in the same cells count: what is carried from a place of its own to a
-common place is missed there. Windows of moments say where to look, so any order of steps will do.
+1 where nothing came of it and near 0 where it is as usual. Its mean over the CELLS_SHARE of cells
+that lack most becomes the logarithm of the share that is there. What a share VARIETY of the trusted
+videos lacks at the same moment, because the step is optional, hands cover it or things lie
+elsewhere, is taken off, and what as many of those lack in which the same hand acts. Only changes
+that most videos show in the same cells count, and none that recurs there, see `recurring`: what is
+carried from a place of its own to a common place is missed there. Windows of moments say where to
+look, so any order of steps will do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,12 +28,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from filtering.moments.counterparts import Counterparts, how_far
 from filtering.moments.evidence.offsets import offset_between, shifted_back
-from filtering.moments.evidence.peers import Flags, Peers
+from filtering.moments.evidence.recurring import recurrences
 from filtering.moments.evidence.stretches import Evidence, Stretch
-from filtering.moments.evidence.usual import VARIETY
+from filtering.moments.evidence.usual import usual_of_others
+from filtering.moments.peers.colours import actors_of
+from filtering.moments.peers.peers import Flags, Looks, Peers
 from filtering.moments.vectors import Video
 
 Array = NDArray[np.float64]
@@ -51,8 +57,6 @@ effect."""
 DOUBTFUL = 6
 """Moments by which the counterpart of a counterpart may miss where it began, or else nothing is
 said about the change."""
-MOST = 255.0
-"""Largest change of a cell, 0..255."""
 STRIDE = 2
 """Every second moment is looked at."""
 OBSERVERS = 3
@@ -75,11 +79,26 @@ LEAST_SHARE = 0.1
 MOST_CELLS = 300
 """Most cells looked at at a moment, those that change most."""
 CELLS = 4
-"""The mean of so many cells that lack most counts: a thing fills as many."""
+"""Least number of cells that change: a thing fills as many."""
+CELLS_SHARE = 0.25
+"""Share of the cells that change, CELLS or more, whose mean counts, those that lack most."""
+OTHER_COLOUR = 0.4
+"""How much of a change into another colour counts as a usual change."""
+OTHER_NEIGHBOURHOOD = 1
+"""How far such a change may lie from where it usually does [cells]."""
+MOST_RECURRENCES = 2
+"""Most times that a change may come about in a reference: a hand comes back to where it rests after
+every step."""
 LASTING = 3
 """Moments that were looked at, one after the other, at which something must be lacking."""
 MOMENTS = 3
 """The mean of so many moments counts."""
+ABOUT = 5
+"""So many moments that were looked at are about the same time: counterparts of what another hand
+does are less precise."""
+FEWEST_ALIKE = 2
+"""Least number of trusted others of the same look, or else nothing is said: nobody knows what comes
+of a step where another hand does it."""
 BRIGHTNESS = 110.0
 """Median brightness that every video is scaled to, 0..255."""
 
@@ -99,12 +118,23 @@ class Usual:
 
     def amounts(self, change: Change) -> Amounts:
         """Return (C,): how much of it a change (H, W, 3) shows."""
-        reach = range(-NEIGHBOURHOOD, NEIGHBOURHOOD + 1)
+        reach = np.arange(-NEIGHBOURHOOD, NEIGHBOURHOOD + 1)
+        down, right = np.repeat(reach, len(reach)), np.tile(reach, len(reach))
         height, width = change.shape[:2]
-        near_rows = np.clip(self.rows + np.repeat(reach, len(reach))[:, None], 0, height - 1)
-        near_columns = np.clip(self.columns + np.tile(reach, len(reach))[:, None], 0, width - 1)
-        near = change[near_rows, near_columns] * self.directions
-        return np.asarray(near.sum(axis=2).max(axis=0), dtype=np.float32)
+        near_rows = np.clip(self.rows + down[:, None], 0, height - 1)
+        near_columns = np.clip(self.columns + right[:, None], 0, width - 1)
+        near = change[near_rows, near_columns]
+        along = (near * self.directions).sum(axis=2).max(axis=0)
+        close = np.maximum(abs(down), abs(right)) <= OTHER_NEIGHBOURHOOD
+        otherwise = np.linalg.norm(near[close], axis=2).max(axis=0)
+        return np.asarray(np.maximum(along, OTHER_COLOUR * otherwise), dtype=np.float32)
+
+    def but(self, left_out: Flags) -> "Usual | None":
+        """Return what usually changes but in some of the (C,) cells; None if that is little."""
+        kept = ~left_out
+        if kept.sum() < CELLS:
+            return None
+        return Usual(self.moment, self.rows[kept], self.columns[kept], self.directions[kept])
 
 
 @dataclass(frozen=True)
@@ -116,26 +146,38 @@ class View:
     usual: tuple[Usual, ...]
     """What usually changes, in order of time; one or more."""
     amounts: tuple[Amounts, ...]
-    """(D, C) of each: how much of it each of D videos shows."""
+    """(D, C) of each: how much of it each of D videos shows, NaN where that is doubtful."""
 
     def lacks(self, peers: Peers) -> Array:
         """Return (T, D): how much less each video shows of each change than others do.
 
-        It is a logarithm of shares, 0 where a video shows what is usual.
+        It is a logarithm of shares, 0 where a video shows what is usual, or where fewer than
+        FEWEST_ALIKE trusted others look like it.
         """
         shares = np.stack([_share_lacking(amounts, peers.trusted) for amounts in self.amounts])
-        # What is lacked for less is a hand that passed, or a counterpart a little off.
-        padded = np.pad(shares, ((0, LASTING - 1), (0, 0)), mode="edge")
-        lasting = np.min([padded[k : k + len(shares)] for k in range(LASTING)], axis=0)
-        lacks = -np.log(1 + LEAST_SHARE - np.clip(lasting, 0.0, 1.0))
-        usual = np.empty_like(lacks)
-        for members, alike in peers.groups():
-            among = [
-                np.quantile(lacks[:, those], 1 - VARIETY, axis=1)
-                for those in (peers.trusted, alike)
-            ]
-            usual[:, members] = np.max(among, axis=0)[:, None]
-        return np.asarray(lacks - usual)
+        # Where it is doubtful what a video shows, neither it nor another is accused by it.
+        own, others = (_lacks(np.nan_to_num(shares, nan=doubt)) for doubt in (0.0, 1.0))
+        usual = usual_of_others(others, peers.trusted)
+        looks = np.unique(peers.looks)
+        for look in looks if len(looks) > 1 else ():
+            members = peers.looks == look
+            trusted = members & peers.trusted
+            about = maximum_filter1d(others, ABOUT, axis=0)
+            alike = usual_of_others(about, trusted)[:, members]
+            nobody = trusted.sum() - trusted[members] < FEWEST_ALIKE
+            among = np.maximum(usual[:, members], alike)
+            usual[:, members] = np.where(nobody, own[:, members], among)
+        return np.asarray(own - usual)
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What one camera sees of what D demonstrations bring about."""
+
+    views: tuple[View, ...]
+    """What usually changes, from the viewpoints of the most central references."""
+    actors: Looks
+    """(D,) the same number where what moves has the same colours."""
 
 
 def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evidence:
@@ -146,8 +188,8 @@ def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evi
     return Evidence(np.array(values), tuple(own), tuple(other))
 
 
-def observe(found: Counterparts, videos: Sequence[Video]) -> list[View]:
-    """Return what usually changes, seen from the most central references."""
+def observe(found: Counterparts, videos: Sequence[Video]) -> Effects:
+    """Return what usually changes, and in which videos the same hands bring it about."""
     states = {r: states_of(videos[r]) for r in found.references}
     places = {row: beginning(states[found.references[row]]) for row in _central(found)}
     seen = {
@@ -161,11 +203,12 @@ def observe(found: Counterparts, videos: Sequence[Video]) -> list[View]:
         for row, changes in usual.items():
             there = seen[row][d] if other is None else placed_as(places[row], other)
             amounts[row].append([_amounts(u, there, found, row, d) for u in changes])
-    return [
+    views = [
         View(row, tuple(changes), tuple(map(np.stack, zip(*amounts[row], strict=True))))
         for row, changes in usual.items()
         if changes
     ]
+    return Effects(tuple(views), actors_of(videos))
 
 
 def beginning(states: States) -> Change:
@@ -218,14 +261,17 @@ def usual_change(moment: int, changes: Change, later: Change) -> Usual | None:
 
 
 def _usual_changes(found: Counterparts, row: int, states: Mapping[int, States]) -> list[Usual]:
-    usual = []
-    for moment in range(0, found.lengths[found.references[row]], STRIDE):
+    usual, reference = [], states[found.references[row]]
+    for moment in range(0, len(reference), STRIDE):
         changes = [_change(own, found, row, k, moment) for k, own in states.items()]
         later = [
             change_at(own, *_around(found, row, k, moment, LATER * REACH))
             for k, own in states.items()
         ]
         known = usual_change(moment, np.stack(changes), np.stack(later))
+        if known is not None:
+            places = reference[:, known.rows, known.columns]
+            known = known.but(recurrences(places, moment, REACH) > MOST_RECURRENCES)
         if known is not None:
             usual.append(known)
     return usual
@@ -234,11 +280,11 @@ def _usual_changes(found: Counterparts, row: int, states: Mapping[int, States]) 
 def _amounts(usual: Usual, own: States, found: Counterparts, row: int, d: int) -> Amounts:
     """Return (C,): the most of a change that a video shows over the spans that are looked at.
 
-    What comes a little sooner or later than elsewhere, or while a hand covers it, is not lacking;
-    nor is it where the counterpart is doubtful.
+    What comes a little sooner or later than elsewhere, or while a hand covers it, is not lacking.
+    NaN where the counterpart is doubtful.
     """
     if not _leads_back(found, row, d, usual.moment):
-        return np.full(len(usual.rows), MOST, dtype=np.float32)
+        return np.full(len(usual.rows), np.nan, dtype=np.float32)
     at = _place(found, row, d, usual.moment)
     before, after = _around(found, row, d, usual.moment, LATER * REACH)
     spans = [(b, a) for b in (at - REACH, before) for a in (at + REACH, after)]
@@ -265,10 +311,25 @@ def _around(found: Counterparts, row: int, d: int, moment: int, reach: int) -> t
 
 
 def _share_lacking(amounts: Amounts, trusted: Flags) -> Array:
-    """Return (D,): share of a usual change that is not there, in the cells that lack most."""
-    usual = np.median(amounts[trusted], axis=0)
+    """Return (D,): share of a usual change that is not there, in the cells that lack most.
+
+    NaN where it is doubtful; nothing is lacking where it is so in all trusted videos.
+    """
+    known = ~np.isnan(amounts).any(axis=1)
+    if not (known & trusted).any():
+        return np.where(known, 0.0, np.nan)
+    usual = np.median(amounts[known & trusted], axis=0)
     lacking = (usual - amounts) / (np.maximum(usual, 0.0) + NOISE)
-    return np.asarray(np.sort(lacking, axis=1)[:, -CELLS:].mean(axis=1))
+    most = max(CELLS, int(CELLS_SHARE * lacking.shape[1]))
+    return np.asarray(np.sort(lacking, axis=1)[:, -most:].mean(axis=1))
+
+
+def _lacks(shares: Array) -> Array:
+    """Return (T, D): logarithms of shares that are lacking for a while."""
+    # What is lacked for less is a hand that passed, or a counterpart a little off.
+    padded = np.pad(shares, ((0, LASTING - 1), (0, 0)), mode="edge")
+    lasting = np.min([padded[k : k + len(shares)] for k in range(LASTING)], axis=0)
+    return np.asarray(-np.log(1 + LEAST_SHARE - np.clip(lasting, 0.0, 1.0)))
 
 
 def _central(found: Counterparts) -> list[int]:

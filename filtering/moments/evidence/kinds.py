@@ -22,6 +22,7 @@ does better in plain ones. Missing and extra count less the more of the stretch 
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,19 +36,21 @@ Array = NDArray[np.float64]
 
 
 def missing_order_extra(
-    references: Sequence[Reference], strange: Sequence[Strange]
+    alike: Sequence[Reference], references: Sequence[Reference], strange: Sequence[Strange]
 ) -> tuple[Evidence, Evidence, Evidence]:
     """Return the evidence of the three kinds, in the order of the name.
 
     Args:
-        references: what is usual.
+        alike: what is usual where the same hand acts: another one is found worse in others.
+        references: what is usual whoever acts: an order is no matter of looks.
         strange: per demonstration how strange its moments are, see `strange_in`.
     """
-    results = [_Comparison(references, one, d) for d, one in enumerate(strange)]
+    by_looks = [_Comparison(alike, one, d) for d, one in enumerate(strange)]
+    by_all = [_Comparison(references, one, d) for d, one in enumerate(strange)]
     return (
-        _evidence([one.missing() for one in results]),
-        _evidence([one.order() for one in results]),
-        _evidence([one.extra() for one in results]),
+        _evidence([one.missing() for one in by_looks]),
+        _evidence([one.order() for one in by_all]),
+        _evidence([one.extra() for one in by_looks]),
     )
 
 
@@ -63,7 +66,11 @@ class _Comparison:
         trusted = [reference for reference in self._references if reference.trusted]
         near = [reference for reference in trusted if reference.speaks_for(d)]
         self._trusted = near if len(near) >= FEWEST else trusted
-        self._lacks = {reference.number: reference.lack(d) for reference in self._references}
+
+    @cached_property
+    def _lacks(self) -> dict[int, Array]:
+        """Per number of a reference (n,) how much farther than usual its counterparts are."""
+        return {reference.number: reference.lack(self._d) for reference in self._references}
 
     def missing(self) -> _Result:
         filled = self._strange.curves[0]

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, Match, unless_again
-from filtering.moments.evidence.peers import Flags, Looks, Peers, everybody
 from filtering.moments.evidence.replaced import Side
 from filtering.moments.evidence.usual import FEWEST
+from filtering.moments.peers.peers import Flags, Looks, Peers, everybody
 
 Array = NDArray[np.float64]
 

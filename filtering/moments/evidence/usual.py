@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, placed, unless_again
-from filtering.moments.evidence.peers import Peers
 from filtering.moments.evidence.stretches import worst
+from filtering.moments.peers.clusters import Flags
+from filtering.moments.peers.peers import Peers
 
 Array = NDArray[np.float64]
 
@@ -64,8 +65,33 @@ def usual_of(curves: NDArray[np.floating]) -> Array:
         curves: (K, n) of those who say what is usual. A reference and the demonstration that is
             judged are counted in, and do not reach it.
     """
-    need = int(np.ceil(VARIETY * (len(curves) + 2))) - 1
-    return np.asarray(np.sort(curves, axis=0)[-max(need, 1)], dtype=np.float64)
+    return np.asarray(np.sort(curves, axis=0)[-_need(len(curves) + 1)], dtype=np.float64)
+
+
+def usual_of_others(values: Array, members: Flags) -> Array:
+    """Return (T, D): for each of D columns what a share VARIETY of the members reaches.
+
+    The column itself is counted in, and does not reach it; where it has no others, it is 0.
+
+    Args:
+        values: (T, D).
+        members: (D,) True for those who say what is usual.
+    """
+    ordered = -np.sort(-values[:, members], axis=1)
+    count = ordered.shape[1]
+    if count == 0:
+        return np.zeros_like(values)
+    padded = np.pad(ordered, ((0, 0), (0, 1)))
+    usual = np.repeat(padded[:, _need(count) - 1, None], values.shape[1], axis=1)
+    need = _need(count - 1)
+    reaches = values[:, members] >= padded[:, need - 1, None]
+    usual[:, members] = np.where(reaches, padded[:, need, None], padded[:, need - 1, None])
+    return usual
+
+
+def _need(others: int) -> int:
+    """Return how many others make a share VARIETY, together with the one that is judged."""
+    return max(int(np.ceil(VARIETY * (others + 1))) - 1, 1)
 
 
 class Reference:
@@ -113,10 +139,10 @@ class Reference:
             d: who is judged.
         """
         others = {k: place for k, place in self._rows.items() if k != d}
-        alike = self._peers.of(d)
+        alike = self._peers.alike(d)
         near = [place for k, place in others.items() if alike[k]]
         usual = usual_of(curves[list(others.values()) or [0]])
-        if FEWEST <= len(near) < len(others):
+        if 0 < len(near) < len(others):
             usual = np.maximum(usual, usual_of(curves[near]))
         return usual
 

@@ -19,7 +19,7 @@ from filtering.moments.evidence.effects import states_of, usual_change
 from filtering.moments.evidence.orders import variety_of
 from filtering.moments.evidence.replaced import Side, replaced
 from filtering.moments.evidence.stretches import peak, worst
-from filtering.moments.evidence.usual import moved, usual_of
+from filtering.moments.evidence.usual import moved, usual_of, usual_of_others
 from filtering.moments.score import score_moments
 from filtering.moments.suitable import comparable
 from filtering.moments.vectors import Video, moment_blocks
@@ -370,6 +370,20 @@ def test_the_worst_twelfth_counts():
     start, stop = peak(curve)
     assert start <= 20
     assert stop >= 24
+
+
+def test_what_a_share_of_the_others_reaches_is_usual():
+    values = np.repeat(np.array([0.0, 5.0]), [7, 4])[None]
+    everybody, few = np.ones(11, dtype=bool), np.arange(11) < 8
+    assert usual_of_others(values, everybody).tolist() == [[5.0] * 11]
+    assert usual_of_others(values[:, :10], everybody[:10]).tolist() == [[5.0] * 7 + [5.0] * 3]
+    assert usual_of_others(values, few).tolist() == [[0.0] * 11]
+    assert usual_of_others(values, ~everybody).tolist() == [[0.0] * 11]
+
+
+def test_none_but_one_is_not_usual_for_that_one():
+    values = np.array([[0.0, 0.0, 3.0]])
+    assert usual_of_others(values, np.ones(3, dtype=bool)).tolist() == [[3.0, 3.0, 0.0]]
 
 
 def test_what_changes_nowhere_is_no_usual_change():

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from filtering.judging.moments import told_of_looks
+from filtering.judging.moments import told_of_actors, told_of_looks
 from filtering.moments.counterparts import compare
-from filtering.moments.evidence.peers import Peers, looks_of
+from filtering.moments.peers.peers import Peers, looks_of
 from filtering.moments.score import score_moments
 from tests.filtering.moments.toy_videos import FEATURES, STEPS, toy_video
 
@@ -23,25 +23,25 @@ def pool(hands, orders=None):
     return videos
 
 
-def found_in(videos):
-    return compare([video.looks for video in videos], range(len(videos)))
+def looks_in(videos):
+    return looks_of(compare([video.looks for video in videos], range(len(videos))))
 
 
 def test_videos_of_two_hands_look_different():
     hands = [0, 1, 0, 0, 1, 0, 0, 1, 0, 0]
-    looks = looks_of(found_in(pool(hands)))
+    looks = looks_in(pool(hands))
     assert len(set(looks)) == 2
     assert all(len({looks[d] for d in range(10) if hands[d] == hand}) == 1 for hand in (0, 1))
 
 
 @pytest.mark.parametrize("hands", [[0] * 10, [0] * 8 + [1] * 2])
 def test_one_hand_or_two_videos_of_another_are_one_look(hands):
-    assert set(looks_of(found_in(pool(hands)))) == {0}
+    assert set(looks_in(pool(hands))) == {0}
 
 
 def test_what_is_left_out_makes_no_look():
     orders = [range(STEPS)] * 6 + [[0, 3, 4]] * 4
-    assert set(looks_of(found_in(pool([0] * 10, orders)))) == {0}
+    assert set(looks_in(pool([0] * 10, orders))) == {0}
 
 
 def test_what_is_seen_until_the_end_is_no_look_unless_it_was_there_from_the_beginning():
@@ -50,12 +50,13 @@ def test_what_is_seen_until_the_end_is_no_look_unless_it_was_there_from_the_begi
         videos = pool([0] * 12)
         for video in videos[1::3]:
             video.looks[round(begins * len(video.looks)) :] += 2 * HAND[0]
-        assert len(set(looks_of(found_in(videos)))) == looks
+        assert len(set(looks_in(videos))) == looks
 
 
 def test_videos_that_are_no_references_have_the_look_of_the_nearest():
     hands = [0, 1] * 6
-    found = compare([video.looks for video in pool(hands)], [0, 1, 2, 3, 4, 5])
+    videos = pool(hands)
+    found = compare([video.looks for video in videos], [0, 1, 2, 3, 4, 5])
     looks = looks_of(found)
     assert looks.tolist() in ([0, 1] * 6, [1, 0] * 6)
 
@@ -64,10 +65,12 @@ def test_peers_are_the_trusted_of_the_same_look_if_there_are_enough():
     peers = Peers(np.array([True] * 5 + [False]), np.array([0, 0, 0, 1, 1, 1]))
     assert peers.of(0).tolist() == [True] * 3 + [False] * 3
     assert peers.of(5).tolist() == [True] * 5 + [False]
-    assert [members.tolist() for members, _ in peers.groups()] == [
-        [True] * 3 + [False] * 3,
-        [False] * 3 + [True] * 3,
-    ]
+    assert peers.alike(5).tolist() == [False] * 3 + [True] * 2 + [False]
+
+
+def test_peers_told_apart_by_other_looks_are_alike_in_both():
+    peers = Peers(np.ones(4, dtype=bool), np.array([0, 0, 1, 1])).told_apart(np.array([0, 1, 1, 1]))
+    assert [peers.alike(d).sum() for d in range(4)] == [1, 1, 2, 2]
 
 
 def test_a_few_correct_videos_of_another_hand_are_not_accused():
@@ -75,10 +78,31 @@ def test_a_few_correct_videos_of_another_hand_are_not_accused():
     assert not score_moments({"front": pool(hands)}).flagged.any()
 
 
+@pytest.mark.parametrize(
+    ("count", "consequence"),
+    [
+        (3, "what is usual among them is no evidence."),
+        (2, "they are too few to say that a step of theirs had no effect."),
+    ],
+)
+def test_another_hand_is_told_with_names(count, consequence):
+    actors = np.array([1] * count + [0] * 4)
+    names = [f"video {d}" for d in range(len(actors))]
+    (told,) = told_of_actors({"front": actors}, names)
+    assert told == (
+        f"In {count} of {count + 4} ({', '.join(names[:count])}) camera front sees what moves in "
+        f"other colours, as of another hand: {consequence}"
+    )
+
+
+def test_one_hand_is_not_told():
+    assert not told_of_actors({"front": np.zeros(5, dtype=int)}, ["a"] * 5)
+
+
 def test_a_look_is_told_with_names():
     told = told_of_looks({"front": np.array([0, 1, 1, 0, 0])}, ["a", "b", "c", "d", "e"])
     assert told == (
-        "Camera front sees 2 of 5 in another way at all times (b, c): what is usual among them is "
+        "Camera front sees 2 of 5 (b, c) in another way at all times: what is usual among them is "
         "no evidence.",
     )
     many = told_of_looks({"top": np.array([0] * 10 + [1] * 9)}, [f"video {n}" for n in range(19)])
