@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from filtering.judging.explain import Clock, Counterpart, Finding
 from filtering.judging.judgement import Judgement
 from filtering.judging.thresholds import Grouping, as_many_as_asked
-from filtering.moments.evidence.effects import FEWEST_ALIKE
 from filtering.moments.evidence.stretches import Stretch
-from filtering.moments.peers.peers import Looks
+from filtering.moments.peers.peers import FEWEST, Looks
 from filtering.moments.score import MomentFinding, MomentScore, score_comparable
 from filtering.moments.suitable import Comparable
 from filtering.vision.frame_features import sampled_frames
@@ -105,7 +104,7 @@ def told_of_looks(looks: Mapping[str, Looks], names: Sequence[str]) -> tuple[str
 
 
 def told_of_actors(actors: Mapping[str, Looks], names: Sequence[str]) -> tuple[str, ...]:
-    """Return a sentence per hand or tool that is not the commonest one of its camera.
+    """Return a sentence per actor that is not the commonest one of its camera.
 
     Args:
         actors: per camera (D,) the same number where what moves has the same colours.
@@ -115,7 +114,7 @@ def told_of_actors(actors: Mapping[str, Looks], names: Sequence[str]) -> tuple[s
         f"In {members} camera {camera} sees what moves in other colours, as of another hand: "
         + (
             "what is usual among them is no evidence."
-            if count > FEWEST_ALIKE
+            if count >= FEWEST
             else "they are too few to say that a step of theirs had no effect."
         )
         for camera, members, count in _uncommon(actors, names)

@@ -166,11 +166,11 @@ def gather(
         effects: what usually changes, and who acts.
         peers: who says what is usual, whoever acts.
     """
-    same_hand = peers.told_apart(effects.actors)
-    alike = references_of(found, same_hand) if effects.actors.any() else references
+    same_actor = peers.told_apart(effects.actors)
+    alike = references_of(found, same_actor) if effects.actors.any() else references
     kinds = (
         *missing_order_extra(alike, references, strange),
-        ineffective(found, effects.views, same_hand),
+        ineffective(found, effects.views, same_actor),
     )
     return dict(zip(KINDS, kinds, strict=True))
 

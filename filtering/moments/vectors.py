@@ -31,6 +31,10 @@ RIDGE = 0.05
 """Least variance of a direction between counterparts [mean variance]."""
 
 
+BRIGHTNESS = 110.0
+"""Median brightness that the cells of every video are scaled to where they are compared, 0..255."""
+
+
 @dataclass(frozen=True)
 class Video:
     """What one camera saw of one demonstration, moment by moment."""
@@ -43,6 +47,12 @@ class Video:
     def __len__(self) -> int:
         """Number of moments."""
         return len(self.looks)
+
+    def lit_alike(self) -> NDArray[np.float32]:
+        """Return (n, H, W, 3): the cells scaled to BRIGHTNESS, so that lamps do not count."""
+        cells = self.cells.astype(np.float32)
+        cells *= BRIGHTNESS / max(float(np.median(cells)), 1.0)
+        return cells
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ videos, the share that is not there is
 1 where nothing came of it and near 0 where it is as usual. Its mean over the CELLS_SHARE of cells
 that lack most becomes the logarithm of the share that is there. What a share VARIETY of the trusted
 videos lacks at the same moment, because the step is optional, hands cover it or things lie
-elsewhere, is taken off, and what as many of those lack in which the same hand acts. Only changes
-that most videos show in the same cells count, and none that recurs there, see `recurring`: what is
-carried from a place of its own to a common place is missed there. Windows of moments say where to
-look, so any order of steps will do.
+elsewhere, is taken off, and what as many of those with the same actor lack. Only changes that most
+videos show in the same cells count, and none that recurs there, see `recurring`: what is carried
+from a place of its own to a common place is missed there. Windows of moments say where to look, so
+any order of steps will do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ from filtering.moments.evidence.recurring import recurrences
 from filtering.moments.evidence.stretches import Evidence, Stretch
 from filtering.moments.evidence.usual import usual_of_others
 from filtering.moments.peers.colours import actors_of
-from filtering.moments.peers.peers import Flags, Looks, Peers
+from filtering.moments.peers.peers import FEWEST, Flags, Looks, Peers
 from filtering.moments.vectors import Video
 
 Array = NDArray[np.float64]
@@ -94,13 +94,8 @@ LASTING = 3
 MOMENTS = 3
 """The mean of so many moments counts."""
 ABOUT = 5
-"""So many moments that were looked at are about the same time: counterparts of what another hand
+"""So many moments that were looked at are about the same time: counterparts of what another actor
 does are less precise."""
-FEWEST_ALIKE = 2
-"""Least number of trusted others of the same look, or else nothing is said: nobody knows what comes
-of a step where another hand does it."""
-BRIGHTNESS = 110.0
-"""Median brightness that every video is scaled to, 0..255."""
 
 
 @dataclass(frozen=True)
@@ -151,20 +146,22 @@ class View:
     def lacks(self, peers: Peers) -> Array:
         """Return (T, D): how much less each video shows of each change than others do.
 
-        It is a logarithm of shares, 0 where a video shows what is usual, or where fewer than
-        FEWEST_ALIKE trusted others look like it.
+        It is a logarithm of shares, 0 where a video shows what is usual, or where it has too few
+        trusted others of its look: nobody knows what comes of a step that another actor does.
         """
         shares = np.stack([_share_lacking(amounts, peers.trusted) for amounts in self.amounts])
         # Where it is doubtful what a video shows, neither it nor another is accused by it.
         own, others = (_lacks(np.nan_to_num(shares, nan=doubt)) for doubt in (0.0, 1.0))
         usual = usual_of_others(others, peers.trusted)
         looks = np.unique(peers.looks)
-        for look in looks if len(looks) > 1 else ():
+        if len(looks) == 1:
+            return np.asarray(own - usual)
+        about = maximum_filter1d(others, ABOUT, axis=0)
+        for look in looks:
             members = peers.looks == look
             trusted = members & peers.trusted
-            about = maximum_filter1d(others, ABOUT, axis=0)
             alike = usual_of_others(about, trusted)[:, members]
-            nobody = trusted.sum() - trusted[members] < FEWEST_ALIKE
+            nobody = trusted.sum() - trusted[members] < FEWEST - 1
             among = np.maximum(usual[:, members], alike)
             usual[:, members] = np.where(nobody, own[:, members], among)
         return np.asarray(own - usual)
@@ -189,7 +186,7 @@ def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evi
 
 
 def observe(found: Counterparts, videos: Sequence[Video]) -> Effects:
-    """Return what usually changes, and in which videos the same hands bring it about."""
+    """Return what usually changes, and in which videos the same actor brings it about."""
     states = {r: states_of(videos[r]) for r in found.references}
     places = {row: beginning(states[found.references[row]]) for row in _central(found)}
     seen = {
@@ -225,11 +222,9 @@ def states_of(video: Video) -> States:
     """Return (n, H, W, 3): cells of equal brightness, blurred, medians over a few moments."""
     import cv2
 
-    cells = video.cells.astype(np.float32)
-    cells *= BRIGHTNESS / max(float(np.median(cells)), 1.0)
-    blurred = np.stack([cv2.GaussianBlur(image, (0, 0), BLUR) for image in cells])
+    blurred = np.stack([cv2.GaussianBlur(image, (0, 0), BLUR) for image in video.lit_alike()])
     padded = np.pad(blurred, ((STILL, STILL), (0, 0), (0, 0), (0, 0)), mode="edge")
-    shifted = [padded[shift : shift + len(cells)] for shift in range(2 * STILL + 1)]
+    shifted = [padded[shift : shift + len(video)] for shift in range(2 * STILL + 1)]
     return np.median(shifted, axis=0).astype(np.float32)
 
 

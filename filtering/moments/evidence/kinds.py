@@ -41,16 +41,16 @@ def missing_order_extra(
     """Return the evidence of the three kinds, in the order of the name.
 
     Args:
-        alike: what is usual where the same hand acts: another one is found worse in others.
+        alike: what is usual for the same actor: what another one does is found worse in others.
         references: what is usual whoever acts: an order is no matter of looks.
         strange: per demonstration how strange its moments are, see `strange_in`.
     """
-    by_looks = [_Comparison(alike, one, d) for d, one in enumerate(strange)]
+    by_actor = [_Comparison(alike, one, d) for d, one in enumerate(strange)]
     by_all = [_Comparison(references, one, d) for d, one in enumerate(strange)]
     return (
-        _evidence([one.missing() for one in by_looks]),
+        _evidence([one.missing() for one in by_actor]),
         _evidence([one.order() for one in by_all]),
-        _evidence([one.extra() for one in by_looks]),
+        _evidence([one.extra() for one in by_actor]),
     )
 
 

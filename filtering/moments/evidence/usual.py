@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from filtering.moments.counterparts import ROUND_TRIP, Counterparts, Match, placed, unless_again
 from filtering.moments.evidence.stretches import worst
-from filtering.moments.peers.clusters import Flags
-from filtering.moments.peers.peers import Peers
+from filtering.moments.peers.peers import Flags, Peers
 
 Array = NDArray[np.float64]
 

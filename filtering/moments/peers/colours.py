@@ -28,8 +28,6 @@ LEVELS = 8
 """Levels of each of three colours."""
 SMOOTHING = 0.7
 """Standard deviation by which a histogram is smoothed: shades of a colour are near [levels]."""
-BRIGHTNESS = 110.0
-"""Median brightness that every video is scaled to, 0..255."""
 RULE = Rule(gap=0.45, gap_of_part=0.35, fewest=1)
 """When another acts. Of three people who make tea the gaps are 0.55 or more, and 0.42 in the part
 that shows it least; in `garden`, `parcel` and `squares` at most 0.35 and 0.31."""
@@ -47,8 +45,7 @@ def actors_of(videos: Sequence[Video]) -> NDArray[np.int64]:
 
 def colours_of(video: Video) -> Array:
     """Return (1 + PARTS, LEVELS^3): histograms of what moves, of the video and of its parts."""
-    cells = video.cells.astype(np.float32)
-    cells *= BRIGHTNESS / max(float(np.median(cells)), 1.0)
+    cells = video.lit_alike()
     windows = np.array_split(cells, max(round(len(cells) / WINDOW), 1))
     still = [np.broadcast_to(np.median(one, axis=0), one.shape) for one in windows]
     moves = np.linalg.norm(cells - np.concatenate(still), axis=-1) > MOVES
