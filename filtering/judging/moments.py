@@ -97,8 +97,8 @@ def told_of_looks(looks: Mapping[str, Looks], names: Sequence[str]) -> tuple[str
         names: (D,) what a person calls the demonstrations.
     """
     return tuple(
-        f"Camera {camera} sees {members} in another way at all times: what is usual among them is "
-        "no evidence."
+        f"Camera {camera} sees another look in {members}, from beginning to end: what is usual "
+        "among them does not count against them."
         for camera, members, _ in _uncommon(looks, names)
     )
 
@@ -111,11 +111,11 @@ def told_of_actors(actors: Mapping[str, Looks], names: Sequence[str]) -> tuple[s
         names: (D,) what a person calls the demonstrations.
     """
     return tuple(
-        f"In {members} camera {camera} sees what moves in other colours, as of another hand: "
+        f"Camera {camera} sees another actor in {members}, told by the colours of what moves: "
         + (
-            "what is usual among them is no evidence."
+            "what is usual among them does not count against them."
             if count >= FEWEST
-            else "they are too few to say that a step of theirs had no effect."
+            else "they are too few to tell whether a step of theirs had no effect."
         )
         for camera, members, count in _uncommon(actors, names)
     )
@@ -129,7 +129,7 @@ def _uncommon(looks: Mapping[str, Looks], names: Sequence[str]) -> Iterator[tupl
             members = [name for name, own in zip(names, of, strict=True) if own == number]
             more = f" and {len(members) - MOST_NAMED} more" if len(members) > MOST_NAMED else ""
             named = f"{', '.join(members[:MOST_NAMED])}{more}"
-            yield camera, f"{len(members)} of {len(names)} ({named})", len(members)
+            yield camera, f"{len(members)} of {len(names)} demonstrations ({named})", len(members)
 
 
 def reason(finding: MomentFinding, counts: Sequence[int], timeline: Timeline) -> str:

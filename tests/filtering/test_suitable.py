@@ -96,6 +96,21 @@ def test_two_videos_are_refused(tmp_path: Path) -> None:
         DemoFilter().fit(open_source(tmp_path / "films"))
 
 
+def test_who_looks_or_acts_otherwise_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for told in ("looks", "actors"):
+        monkeypatch.setattr(
+            f"filtering.judging.moments.told_of_{told}",
+            lambda _, names, told=told: (f"{told} of {', '.join(names)}.",),
+        )
+    films(tmp_path / "films", task)
+    pool = open_source(tmp_path / "films")
+    found = DemoFilter(FilterConfig(score="moments")).fit(pool)
+    for told in ("looks", "actors"):
+        assert f"{told} of {', '.join(episode.name for episode in pool.episodes)}." in found.words_
+
+
 def test_another_camera_is_used_where_the_main_one_sees_nothing(tmp_path: Path) -> None:
     films(tmp_path / "films" / "left", black)
     films(tmp_path / "films" / "side", task)

@@ -49,6 +49,18 @@ def test_what_moves_for_a_part_of_a_video_is_no_other_hand():
     assert len(grouped(actors_of(videos))) == 1
 
 
+def test_what_was_put_down_moves_no_more():
+    """In every other video a large thing is put down and stays; it moved for a moment only."""
+    videos = []
+    for d in range(8):
+        parts = [acted("light", 10 * d + part) for part in range(5)]
+        cells = np.concatenate([part.cells for part in parts])
+        if d % 2:
+            cells[-2 * LENGTH :, 2:12, 2:14] = (40, 60, 200)
+        videos.append(Video(np.zeros((len(cells), 3), np.float32), cells))
+    assert len(grouped(actors_of(videos))) == 1
+
+
 def test_two_videos_are_not_told_apart():
     assert len(grouped(actors_of([acted("light", 0), acted("dark", 1)]))) == 1
 

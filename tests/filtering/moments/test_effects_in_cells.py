@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 
-from filtering.moments.evidence.effects import CELLS_SHARE, OTHER_COLOUR, usual_change
+from filtering.moments.counterparts import compare
+from filtering.moments.evidence.effects import OTHER_COLOUR, View, observe, usual_change
 from filtering.moments.evidence.recurring import recurrences
+from filtering.moments.peers.peers import everybody
+from tests.filtering.moments.toy_videos import HEIGHT, STEPS, toy_video
 
 TABLE, HAND, CUP = (150.0, 100.0, 50.0), (220.0, 180.0, 150.0), (60.0, 60.0, 200.0)
 
@@ -44,7 +47,6 @@ def test_cells_that_are_left_out_do_not_count():
     assert kept is not None
     assert len(kept.rows) == 8
     assert usual.but(np.arange(48) < 45) is None
-    assert 0 < CELLS_SHARE <= 1
 
 
 def seen_as(*colours, stay=10):
@@ -75,3 +77,49 @@ def test_what_covers_a_cell_for_a_while_is_no_recurrence():
 def test_a_cell_that_does_not_change_has_no_recurrences():
     places = seen_as(TABLE, TABLE, TABLE)
     assert recurrences(places, 15, reach=5).tolist() == [0]
+
+
+def test_where_a_hand_comes_back_to_rest_there_is_no_usual_change():
+    rest = HEIGHT - 5  # the squares of the steps lie above it
+    videos = [toy_video(range(STEPS), seed, tempo=3.0) for seed in range(5)]
+    for video in videos:
+        for moment, cells in enumerate(video.cells):
+            if moment / len(video.cells) * STEPS % 1 < 0.5:
+                cells[rest:, :6] = HAND
+    found = compare([video.looks for video in videos], range(5))
+    changes = [usual for view in observe(found, videos).views for usual in view.usual]
+    shown = [bool((usual.rows >= rest).any()) for usual in changes]
+    assert np.mean(shown) < 0.2  # at the edges of a rest it is not always told
+
+
+SIZE = 100.0
+"""How much of the usual change a video shows that shows all of it."""
+
+
+def lacked(shown):
+    """Return (D,): the most that is lacking, of (D, C) how much is shown for a while."""
+    usual = usual_of(as_usual(CUP))
+    amounts = tuple(np.array(shown, dtype=np.float32) for _ in range(6))
+    return View(0, (usual,) * 6, amounts).lacks(everybody(np.zeros(len(shown), int))).max(axis=0)
+
+
+def test_who_lacks_a_quarter_of_a_usual_change_lacks_it():
+    shown = np.full((10, 8), SIZE)
+    shown[3, :2] = 0.0
+    assert lacked(shown).argmax() == 3
+    shown[3, 1] = SIZE
+    assert lacked(shown)[3] < lacked(np.where(np.arange(10)[:, None] == 3, 0.0, SIZE))[3] / 2
+
+
+def test_nothing_is_lacking_where_it_is_doubtful_what_a_video_shows():
+    shown = np.full((10, 8), SIZE)
+    shown[3] = np.nan
+    assert (lacked(shown) <= 0).all()
+
+
+def test_nobody_is_accused_of_what_is_doubtful_in_others():
+    shown = np.full((10, 8), SIZE)
+    shown[3] = 0.0
+    assert lacked(shown)[3] > 1
+    shown[[1, 5, 6]] = np.nan
+    assert lacked(shown)[3] <= 0

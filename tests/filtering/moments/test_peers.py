@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 
 from filtering.judging.moments import told_of_actors, told_of_looks
+from filtering.moments import score
 from filtering.moments.counterparts import compare
-from filtering.moments.peers.peers import Peers, looks_of
-from filtering.moments.score import score_moments
+from filtering.moments.evidence.effects import Effects
+from filtering.moments.evidence.kinds import missing_order_extra
+from filtering.moments.evidence.strange import strange_in
+from filtering.moments.evidence.usual import Reference, references_of
+from filtering.moments.peers.peers import Peers, everybody, looks_of
+from filtering.moments.score import gather, score_moments
 from tests.filtering.moments.toy_videos import FEATURES, STEPS, toy_video
 
 HAND = np.random.default_rng(5).normal(0, 1, (3, FEATURES)).astype(np.float32)
@@ -78,11 +83,57 @@ def test_a_few_correct_videos_of_another_hand_are_not_accused():
     assert not score_moments({"front": pool(hands)}).flagged.any()
 
 
+def test_an_order_is_judged_among_all_and_the_rest_among_the_same_actor():
+    actors = np.array([1] * 5 + [0] * 8)
+    orders = [[0, 1, 5, 3, 4]] * 2 + [[2, 0, 1, 3, 4]] * 2 + [range(STEPS)] * 9
+    videos = pool(actors, orders)
+    found = compare([video.looks for video in videos], range(len(videos)))
+    everyone = everybody(np.zeros_like(actors))
+    strange = strange_in(found, np.zeros_like(actors))
+    references = references_of(found, everyone)
+    alike = references_of(found, everyone.told_apart(actors))
+    among_all = missing_order_extra(references, references, strange)
+    by_actor = missing_order_extra(alike, alike, strange)
+    gathered = gather(found, references, strange, Effects((), actors), everyone)
+    for kind, same, whole in zip(("missing", "order", "extra"), by_actor, among_all, strict=True):
+        expected = whole if kind == "order" else same
+        assert (same.values != whole.values).any()
+        assert gathered[kind].values.tolist() == expected.values.tolist()
+
+
+def test_what_is_strange_is_so_among_those_that_look_and_act_alike(monkeypatch):
+    asked: list[list[int]] = []
+
+    def strange(found, looks):
+        asked.append(looks.tolist())
+        return strange_in(found, looks)
+
+    monkeypatch.setattr(score, "strange_in", strange)
+    monkeypatch.setattr(score, "looks_of", lambda found: np.zeros(len(found.lengths), int))
+    hands = [1] * 3 + [0] * 5
+    videos = pool([0] * 8)
+    for video, hand in zip(videos, hands, strict=True):
+        for moment, cells in enumerate(video.cells):
+            column = moment * 5 % 18
+            cells[-6:, column : column + 6] = (90, 55, 35) if hand else (225, 180, 150)
+    told = score_moments({"front": videos})
+    assert asked == [told.actors["front"].tolist()]
+    assert len(set(asked[0])) == 2
+
+
+def test_what_two_that_look_alike_do_is_usual_for_them_too():
+    videos = pool([0] * 8, [[0, 1, 3, 4], [0, 1, 3, 4], *[range(STEPS)] * 6])
+    found = compare([video.looks for video in videos], range(8))
+    one, two = np.zeros(8, int), np.array([1, 1, *[0] * 6])
+    lacks = [Reference(found, 5, everybody(looks)).lack(0).max() for looks in (one, two)]
+    assert lacks[1] < lacks[0] / 2
+
+
 @pytest.mark.parametrize(
     ("count", "consequence"),
     [
-        (3, "what is usual among them is no evidence."),
-        (2, "they are too few to say that a step of theirs had no effect."),
+        (3, "what is usual among them does not count against them."),
+        (2, "they are too few to tell whether a step of theirs had no effect."),
     ],
 )
 def test_another_hand_is_told_with_names(count, consequence):
@@ -90,8 +141,8 @@ def test_another_hand_is_told_with_names(count, consequence):
     names = [f"video {d}" for d in range(len(actors))]
     (told,) = told_of_actors({"front": actors}, names)
     assert told == (
-        f"In {count} of {count + 4} ({', '.join(names[:count])}) camera front sees what moves in "
-        f"other colours, as of another hand: {consequence}"
+        f"Camera front sees another actor in {count} of {count + 4} demonstrations "
+        f"({', '.join(names[:count])}), told by the colours of what moves: {consequence}"
     )
 
 
@@ -102,8 +153,8 @@ def test_one_hand_is_not_told():
 def test_a_look_is_told_with_names():
     told = told_of_looks({"front": np.array([0, 1, 1, 0, 0])}, ["a", "b", "c", "d", "e"])
     assert told == (
-        "Camera front sees 2 of 5 (b, c) in another way at all times: what is usual among them is "
-        "no evidence.",
+        "Camera front sees another look in 2 of 5 demonstrations (b, c), from beginning to end: "
+        "what is usual among them does not count against them.",
     )
     many = told_of_looks({"top": np.array([0] * 10 + [1] * 9)}, [f"video {n}" for n in range(19)])
     assert "(video 10, " in many[0]
