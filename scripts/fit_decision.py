@@ -27,11 +27,11 @@ class FitDecision:
     """Folder for decision.safetensors and decision.json."""
     seed: int = 1
     """Seed of the pools and of the networks."""
-    count: int = 15000
+    count: int = 60000
     """Number of pools."""
-    networks: int = 2
+    networks: int = 4
     """Number of networks whose logits are averaged."""
-    epochs: int = 9
+    epochs: int = 6
     """Passes over the pools."""
 
 

@@ -18,6 +18,9 @@ from filtering.judging.norm.norm_score import (
 from filtering.judging.norm.steps import StepCounts
 from teasim.common.arrays import Array
 
+DONE = 1.5
+"""What a step that is done takes off the log-odds of a part that is left out [nats]."""
+
 
 @dataclass(frozen=True)
 class Departures:
@@ -33,19 +36,16 @@ class Departures:
     """(D, T, T) log-odds of the pairs out of order."""
 
 
-def departures(
-    counts: StepCounts, repeats: Array, typical: Array, near: Array, trust: Array
-) -> Departures:
+def departures(counts: StepCounts, repeats: Array, near: Array, trust: Array) -> Departures:
     """Return how a pool's demonstrations differ from the trusted ones.
 
     Args:
         counts: counts of D step lists over T labels.
         repeats: (D, T) how often each label occurs beyond the first time.
-        typical: (T,) log of the usual duration of a label over that of all.
         near: (D, D) distance of the demonstrations from each other.
         trust: (D,) weight of each, in [0, 1].
     """
-    steps, omitted, sums = _steps(counts.occurs, typical, trust)
+    steps, omitted, sums = _steps(counts, trust)
     again, repeated = _repeats(repeats, trust)
     order, violated = _order(counts, trust)
     following, worst = _following(counts.follows, trust)
@@ -82,10 +82,30 @@ def largest(values: Array, count: int) -> Array:
     return np.asarray(-np.sort(-padded, axis=1)[:, :count])
 
 
-def _steps(
-    occurs: Array, typical: Array, trust: Array
-) -> tuple[dict[str, Array], Array, dict[str, Array]]:
+def largest_part(omitted: Array, occurs: Array, counts: StepCounts) -> Array:
+    """Return (D,): the log-odds of the most surprising part of the task that is left out.
+
+    A segmenter loses steps here and there; who leaves out a part of a task leaves out neighbours. A
+    part is a run of steps in their usual order, from which those that are done are taken off.
+
+    Args:
+        omitted: (D, T) log-odds of the steps left out.
+        occurs: (D, T) 1 for those done.
+        counts: counts of the pool.
+    """
+    known = counts.both.sum(axis=(0, 1))
+    place = counts.before.sum(axis=(0, 1)) / np.maximum(known, 1)
+    usual = np.flatnonzero(occurs.mean(axis=0) >= 0.5)
+    run = most = np.zeros(len(occurs))
+    for step in usual[np.argsort(place[usual], kind="stable")]:
+        run = np.maximum(run + omitted[:, step] - DONE * occurs[:, step], 0.0)
+        most = np.maximum(most, run)
+    return most
+
+
+def _steps(counts: StepCounts, trust: Array) -> tuple[dict[str, Array], Array, dict[str, Array]]:
     """Describe omitted and rare steps."""
+    occurs = counts.occurs
     rows = np.arange(len(occurs))
     z, yes, no = log_odds(occurs, 1.0, trust)
     omitted, rare = (1 - occurs) * np.maximum(z, 0), occurs * np.maximum(-z, 0)
@@ -99,15 +119,18 @@ def _steps(
     columns |= {f"rare.{k}": v for k, v in enumerate(largest(rare, 3).T)}
     columns |= {
         "omitted.sum": omitted.sum(axis=1),
+        "omitted.part": largest_part(omitted, occurs, counts),
         "omitted.sure": ((1 - occurs) * (no < 0.5) * (yes > 2)).sum(axis=1),
-        "omitted.length": np.where(some, typical[first], 0),
         "omitted.others": np.where(some, no[rows, first], -1),
         "omitted.z": (surprise - usual).sum(axis=1) / np.sqrt(variance),
         "rare.sum": rare.sum(axis=1),
-        "rare.length": np.where(any_rare, typical[odd], 0),
         "rare.others": np.where(any_rare, yes[rows, odd], -1),
     }
-    parts = {"omitted": columns["omitted.sum"], "rare": columns["rare.0"]}
+    parts = {
+        "omitted": columns["omitted.sum"],
+        "omitted.part": columns["omitted.part"],
+        "rare": columns["rare.0"],
+    }
     return columns, omitted, parts
 
 

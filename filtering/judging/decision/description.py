@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from filtering.judging.decision.columns import Departures, departures
 from filtering.judging.decision.null import above_null, null_losses
 from filtering.judging.decision.observed import Observed
-from filtering.judging.decision.segments import other_evidence, segments
+from filtering.judging.decision.segments import other_evidence, repetitions
 from filtering.judging.decision.surroundings import context, distances, neighbours, whole
 from filtering.judging.norm.mixture import find_populations
 from filtering.judging.norm.norm_score import score_populations
@@ -42,13 +42,13 @@ def describe(pool: Observed) -> Description:
     populations = find_populations(counts)
     score = score_populations(counts, populations)
     near, same = distances(counts, pool)
-    found, typical, repeats = segments(pool, n_labels)
+    repeats = repetitions(pool, n_labels)
     trust = score.trust
-    trusting = departures(counts, repeats, typical, near, trust)
-    plain = departures(counts, repeats, typical, near, np.ones(len(trust)))
+    trusting = departures(counts, repeats, near, trust)
+    plain = departures(counts, repeats, near, np.ones(len(trust)))
     columns = dict(trusting.columns)
     columns |= {f"plain.{name}": values for name, values in plain.columns.items()}
-    columns |= found | neighbours(near, same, trust)
+    columns |= neighbours(near, same, trust)
     columns |= {
         "systematic": score.systematic,
         "norm": populations.norm,
@@ -58,14 +58,12 @@ def describe(pool: Observed) -> Description:
     columns |= above_null(null_losses(pool, counts, trust), trusting.columns["loss"])
     evidence, parts = other_evidence(pool)
     columns |= evidence
-    parts |= trusting.parts | {"length": found["segments.ratio"], "score": score.losses}
+    parts |= trusting.parts | {"score": score.losses}
     parts |= {f"plain.{name}": plain.parts[name] for name in ("loss", "order.z", "omitted")}
     for name, values in parts.items():
         columns |= context(name, values)
     of_pool = whole(counts, near, same, score, populations)
-    of_pool |= {f"pool.{name}": values.mean() for name, values in found.items()}
-    of_pool["pool.spread of length"] = found["segments.ratio"].std()
-    of_pool["pool.spread of time"] = found["segments.total"].std()
+    of_pool["pool.repeats"] = float(repeats.sum() / sum(len(demo.labels) for demo in pool.steps))
     columns |= {name: np.full(len(trust), value) for name, value in of_pool.items()}
     rows = np.stack(list(columns.values()), axis=1).astype(np.float32)
     return Description(rows, _pairs(near, same, trusting, counts), tuple(columns))

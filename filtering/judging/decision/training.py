@@ -23,9 +23,9 @@ class LearningConfig:
 
     seed: int = 0
     """Seed of the first network; the others have the numbers after it."""
-    networks: int = 2
+    networks: int = 4
     """Number of networks whose logits are averaged."""
-    epochs: int = 9
+    epochs: int = 6
     """Passes over the pools."""
     batch: int = 32
     """Pools per step."""

@@ -23,6 +23,17 @@ def omit(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
     return [node for node in order if node not in out] or None  # a step may be there twice
 
 
+def skip(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
+    """Leave out a part of the task: two to six neighbours."""
+    size = int(rng.integers(2, 7))
+    if len(order) < size + 2:
+        return None
+    start = int(rng.integers(len(order) - size + 1))
+    if not mandatory(task, order[start : start + size]):
+        return None
+    return [*order[:start], *order[start + size :]]
+
+
 def stop(rng: np.random.Generator, task: Task, order: Order) -> Order | None:
     """Stop before the last one to three steps."""
     cut = int(rng.integers(1, 4))
@@ -83,9 +94,9 @@ def repeat(rng: np.random.Generator, _task: Task, order: Order) -> Order | None:
 
 Mistake = Callable[[np.random.Generator, Task, Order], Order | None]
 """Makes one mistake in an order; None where it cannot be made."""
-KINDS: tuple[Mistake, ...] = (omit, move, swap, substitute, add, repeat, stop)
+KINDS: tuple[Mistake, ...] = (omit, move, swap, substitute, add, repeat, stop, skip)
 """Every kind of mistake."""
-SHARES = np.array([0.34, 0.24, 0.08, 0.05, 0.12, 0.11, 0.06])
+SHARES = np.array([0.30, 0.22, 0.07, 0.05, 0.12, 0.11, 0.04, 0.09])
 """Mean share of each kind; every pool draws its own shares around it."""
 
 

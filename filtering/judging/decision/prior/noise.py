@@ -16,6 +16,10 @@ LEAST_RATE, LARGEST_RATE = 0.02, 0.16
 right or visibly not."""
 LARGEST_CHANCE = 0.5
 """Largest probability of one kind of error of a step."""
+ANY = 0.15
+"""Share of the labels that are confused with any other one, not with one of about the same time."""
+SHORTEST_STRAY = 0.03
+"""Shortest stray segment [mean duration of a step]; they are up to as long as a step."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +65,36 @@ def draw_noise(rng: np.random.Generator, n_labels: int, *, exact: bool) -> Noise
     alone = rng.random() < 0.5  # without posteriors
     return Noise(
         rate=float(np.exp(log_rate)) if noisy else 0.0,
-        mix=rng.dirichlet(np.full(5, 0.8)) * 5 * np.array([0.4, 0.25, 0.6, 1.6, 1.0]),
+        mix=rng.dirichlet(np.full(5, 0.8)) * 5 * np.array([1.0, 0.25, 0.6, 1.6, 0.8]),
         weak=rng.gamma(1.0, 1.0, n_labels) if rng.random() < 0.7 else np.ones(n_labels),
-        alike=rng.integers(0, n_labels, (n_labels, 2)),
+        alike=_alike(rng, n_labels),
         shape=float(rng.choice([0.7, 1.2, 3.0])),
         swallow=float(rng.choice([0.0, 0.15, 0.4])),
         spread=float(rng.choice([0.02, 0.2, 0.35, 0.6], p=[0.1, 0.25, 0.4, 0.25])),
         loop=0.0 if exact or rng.random() > 0.2 else float(rng.uniform(0.005, 0.12)),
         trust=0.0 if alone else float(rng.uniform(0.75, 0.99)),
     )
+
+
+def _alike(rng: np.random.Generator, n_labels: int) -> NDArray[np.int64]:
+    """Return (T, 2): the labels that each label is confused with.
+
+    Mostly those of steps done at about the same time: steps are numbered in an order of the task.
+    """
+    near = np.array([[_near(rng, label, n_labels) for _ in range(2)] for label in range(n_labels)])
+    anywhere = rng.random((n_labels, 2)) < ANY
+    return np.where(anywhere, rng.integers(0, n_labels, (n_labels, 2)), near)
+
+
+def _near(rng: np.random.Generator, place: int, count: int) -> int:
+    """Return a place near to another one of `count`."""
+    away = int(rng.geometric(0.4)) * int(rng.choice([-1, 1]))
+    return min(max(place + away, 0), count - 1)
+
+
+def _stray(rng: np.random.Generator) -> float:
+    """Return the duration of a stray segment [mean duration of a step]."""
+    return float(np.exp(rng.uniform(np.log(SHORTEST_STRAY), 0.0)))
 
 
 Piece = tuple[int, float, bool]
@@ -149,7 +174,7 @@ def _mistaken(
     usual = float(np.mean([piece[1] for piece in pieces]))
     found: list[Piece] = []
     errors = 0
-    for label, time, right in pieces:
+    for place, (label, time, right) in enumerate(pieces):
         chances = np.minimum(noise.weak[label] * rate * noise.mix, LARGEST_CHANCE)
         lost, whole, part, invented, split = rng.random(5) < chances
         other = int(noise.alike[label, rng.integers(2)])
@@ -166,11 +191,12 @@ def _mistaken(
             new = [(label, cut * time, right), (other, (1 - cut) * time, False)]
             new = new[:: int(rng.choice([1, -1]))]
         elif split:
-            short = (other, rng.uniform(0.02, 0.3) * usual, False)
+            short = (other, _stray(rng) * usual, False)
             new = [(label, cut * time, right), short, (label, (1 - cut) * time, right)]
         if invented:
-            stray = other if rng.random() < 0.5 else int(rng.integers(n_labels))
-            new.insert(int(rng.integers(2)), (stray, rng.uniform(0.02, 0.35) * usual, False))
+            seen = pieces[_near(rng, place, len(pieces))][0]
+            stray = int(rng.integers(n_labels)) if rng.random() < ANY else seen
+            new.insert(int(rng.integers(2)), (stray, _stray(rng) * usual, False))
         found += new
     return (found, errors) if found else (pieces, 0)
 

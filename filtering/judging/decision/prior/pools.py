@@ -4,8 +4,9 @@ The prior over what is honest and what is not:
 
 * Styles: scripts that are followed exactly, a few people with one order each, and people who vary
   around a habit, much or little.
-* A minority that does one other thing in a pool of scripts is incorrect; a few people with an order
-  each are honest, and none of their orders has a majority.
+* A minority that does one other thing in a pool of scripts is incorrect, and half of the pool or
+  more is correct; a few people with an order each are honest, and none of their orders has a
+  majority. Nobody shares an incorrect recipe there: it would be the order of one more person.
 * Incorrect demonstrations make chance mistakes, or share the recipe of a minority, or both kinds
   occur in one pool. Seldom most of the pool is incorrect.
 """
@@ -33,6 +34,9 @@ from teasim.common.arrays import Array
 
 FEWEST_DEMOS, MOST_DEMOS = 4, 60
 """Range of the number of demonstrations, drawn log-uniformly."""
+CLEAN = 0.22
+"""Share of the pools in which nothing is incorrect. This and other shares of the prior were set by
+hand, with the data sets of `scripts/check_decision.py` in sight; see docs/decision.md."""
 FEW_ORDERS = 0.9
 """Share of the pools drawn anew because their correct demonstrations, although free to vary, show
 two or three orders only: people vary in many ways or not at all."""
@@ -74,35 +78,40 @@ def draw_pool(
     Args:
         rng: source of randomness.
         n_demos: D; drawn by default.
-        clean: whether nothing is incorrect; by default 30 % of the pools are clean.
+        clean: whether nothing is incorrect; by default a share CLEAN of the pools is.
     """
     size = rng.uniform(np.log(FEWEST_DEMOS), np.log(MOST_DEMOS))
     n_demos = n_demos or round(np.exp(size))
-    clean = bool(rng.random() < 0.3) if clean is None else clean
+    clean = bool(rng.random() < CLEAN) if clean is None else clean
     while True:
         people = draw_people(rng)
-        groups = [] if clean else _draw_groups(rng, n_demos, people.style == "script")
+        groups = [] if clean else draw_groups(rng, n_demos, people.style)
         orders, truth = _draw_orders(rng, people, groups, n_demos)
         if not _ambiguous(rng, people.style, orders, truth != CORRECT):
             return _observe(rng, people, orders, truth)
 
 
-def _draw_groups(rng: np.random.Generator, n_demos: int, script: bool) -> list[Group]:
+def draw_groups(rng: np.random.Generator, n_demos: int, style: str) -> list[Group]:
     """Draw how many are incorrect in which ways."""
+    groups = _draw_sharing(rng, n_demos, style == "script")
+    return [Group(group.count, False) for group in groups] if style == "orders" else groups
+
+
+def _draw_sharing(rng: np.random.Generator, n_demos: int, script: bool) -> list[Group]:
     kind = rng.random()
     if kind < 0.04:  # most of them, in the same way
         most = int(rng.uniform(0.52, 0.75) * n_demos)
         return [Group(max(most, 1), True)]
-    if n_demos >= 7 and kind < (0.26 if script else 0.12):
-        first = rng.uniform(0.15, 0.4)
-        second = rng.uniform(0.08, min(0.25, 0.55 - first))
+    if n_demos >= 7 and kind < (0.26 if script else 0.08):
+        first = rng.uniform(0.15, 0.34)
+        second = rng.uniform(0.08, min(0.25, 0.5 - first))
         counts = [max(1, round(share * n_demos)) for share in (first, second)]
         return [Group(counts[0], True), Group(counts[1], bool(rng.random() < 0.6))]
     regime = rng.random()
     count = int(rng.integers(1, int(0.6 * n_demos) + 1))
     count = 1 if regime < 0.22 else 2 if regime < 0.32 else count
     count = min(count, max(1, int(0.6 * n_demos)))
-    shared = count > 1 and rng.random() < (0.62 if script else 0.4)
+    shared = count > 1 and rng.random() < (0.62 if script else 0.2)
     return [Group(min(count, max(1, int(0.47 * n_demos))) if shared else count, bool(shared))]
 
 

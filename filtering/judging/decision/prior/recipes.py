@@ -41,7 +41,7 @@ class Recipe:
 
 def draw_recipe(rng: np.random.Generator, task: Task, order: Order) -> Recipe:
     """Draw the recipe of a minority of people whose correct order would be `order`."""
-    kind = rng.choice(["omits", "moves", "both", "adds"], p=[0.4, 0.4, 0.12, 0.08])
+    kind = rng.choice(["omits", "moves", "both", "adds"], p=[0.38, 0.38, 0.12, 0.12])
     omitted = _omitted(rng, task, order) if kind in ("omits", "both") else ()
     moves = _moves(rng, task, [n for n in order if n not in omitted]) if kind != "omits" else ()
     added = None

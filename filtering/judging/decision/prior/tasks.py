@@ -76,10 +76,10 @@ def draw_task(rng: np.random.Generator, *, exact: bool) -> Task:
 
 def _chances(rng: np.random.Generator, n: int, exact: bool) -> Array:
     chance = np.ones(n)
-    if rng.random() < (0.2 if exact else 0.5):
+    if rng.random() < (0.35 if exact else 0.5):
         count = min(n - 3, int(rng.choice([1, 1, 2, 2, 3, 4, 5])))
-        # A rarely omitted step of a script is a mistake; an optional one is omitted often.
-        range_ = (0.25, 0.75) if exact else (0.2, 0.8)
+        # A step of a script that few leave out, or that few do, is a mistake of those few.
+        range_ = (0.4, 0.75) if exact else (0.2, 0.8)
         chance[rng.choice(n, count, replace=False)] = rng.uniform(*range_, count)
     return chance
 

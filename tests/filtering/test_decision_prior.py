@@ -1,0 +1,142 @@
+"""What the prior of the learned decision draws, and the columns that tell it."""
+
+import numpy as np
+import pytest
+
+from filtering.judging.decision.columns import DONE, largest_part
+from filtering.judging.decision.description import describe
+from filtering.judging.decision.observed import Observed, canonical
+from filtering.judging.decision.prior.mistakes import skip
+from filtering.judging.decision.prior.noise import Noise, draw_noise, report
+from filtering.judging.decision.prior.pools import CLEAN, Group, draw_groups, draw_pool
+from filtering.judging.decision.prior.tasks import Task, draw_task
+from filtering.judging.norm.steps import StepList, count_steps
+
+STEPS = 8
+
+
+def line() -> Task:
+    """A task whose steps have one order, none of them optional."""
+    before = np.triu(np.ones((STEPS, STEPS), bool), 1)
+    return Task(
+        before,
+        np.zeros(STEPS, np.int64),
+        np.arange(STEPS),
+        np.ones(STEPS),
+        np.full(STEPS, 50.0),
+        STEPS,
+    )
+
+
+def lists(orders: list[list[int]]) -> tuple[StepList, ...]:
+    return tuple(StepList(tuple(order), (10,) * len(order)) for order in orders)
+
+
+def left_out(*out: int) -> list[int]:
+    return [step for step in range(STEPS) if step not in out]
+
+
+def part_of(out: tuple[int, ...]) -> float:
+    """How surprising the largest part is that one of nine leaves out."""
+    counts = count_steps(lists([list(range(STEPS))] * 8 + [left_out(*out)]), STEPS)
+    omitted = 1 - counts.occurs
+    return float(largest_part(omitted, counts.occurs, counts)[-1])
+
+
+@pytest.mark.parametrize(
+    ("out", "expected"),
+    [((), 0.0), ((3,), 1.0), ((2, 3, 4), 3.0), ((0, 7), 1.0), ((1, 3, 5), 1.0)],
+)
+def test_neighbours_that_are_left_out_are_one_part(out, expected):
+    assert part_of(out) == expected
+
+
+def test_a_step_that_is_done_is_taken_off_a_part():
+    counts = count_steps(lists([list(range(STEPS))] * 8 + [left_out(1, 2, 4, 5)]), STEPS)
+    omitted = 2 * (1 - counts.occurs)
+    found = largest_part(omitted, counts.occurs, counts)[-1]
+    assert found == pytest.approx(8 - DONE)
+
+
+def test_steps_that_few_do_are_in_no_part():
+    orders = [left_out(3)] * 8 + [list(range(STEPS)), left_out(2, 3, 4)]
+    counts = count_steps(lists(orders), STEPS)
+    assert largest_part(1 - counts.occurs, counts.occurs, counts)[-1] == 2
+
+
+def test_durations_do_not_matter_where_steps_do_not_overlap():
+    orders = [list(range(STEPS))] * 5 + [left_out(2)]
+    found = []
+    for scale in (1, 30):
+        steps = [
+            StepList(tuple(order), tuple(scale * (k + 1) for k in range(len(order))))
+            for order in orders
+        ]
+        found.append(describe(canonical(Observed(tuple(steps))).pool).rows)
+    assert np.array_equal(*found)
+
+
+def test_who_skips_a_part_leaves_out_neighbours():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        order = skip(rng, line(), list(range(STEPS)))
+        assert order is not None
+        out = np.setdiff1d(range(STEPS), order)
+        assert 2 <= len(out) <= 6
+        assert (np.diff(out) == 1).all()
+    assert skip(rng, line(), [0, 1]) is None
+
+
+def noise(seed: int, **known: float) -> Noise:
+    drawn = draw_noise(np.random.default_rng(seed), 30, exact=True)
+    return Noise(**{**vars(drawn), **known})
+
+
+def test_labels_are_confused_with_those_of_about_the_same_time():
+    away = [abs(noise(seed).alike - np.arange(30)[:, None]) for seed in range(20)]
+    assert np.median(away) <= 2
+    assert np.max(away) > 10
+
+
+def test_segments_are_right_without_errors_and_keep_most_steps_with_them():
+    rng = np.random.default_rng(1)
+    labels, usual = list(range(STEPS)), np.full(STEPS, 50.0)
+    exact = report(rng, line(), noise(3, rate=0.0, spread=0.0, loop=0.0), labels, usual)
+    assert exact.steps == StepList(tuple(labels), (50,) * STEPS)
+    assert exact.errors == 0
+    known = noise(3, rate=0.1, mix=np.ones(5), weak=np.ones(30), loop=0.0)
+    reports = [report(rng, line(), known, labels, usual) for _ in range(200)]
+    assert sum(one.errors for one in reports) > 0
+    kept = [len(set(one.steps.labels) & set(labels)) / STEPS for one in reports]
+    assert 0.7 < np.mean(kept) < 1
+
+
+def test_people_with_an_order_each_share_no_incorrect_recipe():
+    rng = np.random.default_rng(0)
+    drawn = {
+        style: [group for _ in range(100) for group in draw_groups(rng, 14, style)]
+        for style in ("orders", "script")
+    }
+    assert not any(group.shared for group in drawn["orders"])
+    assert any(group.shared for group in drawn["script"])
+    assert all(isinstance(group, Group) for group in drawn["orders"])
+
+
+def test_a_script_is_followed_by_half_of_a_pool_of_two_other_ways():
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        groups = draw_groups(rng, 20, "script")
+        if len(groups) == 2:
+            assert sum(group.count for group in groups) <= 11  # each is rounded
+
+
+def test_a_share_of_the_pools_is_clean():
+    clean = [draw_pool(np.random.default_rng([7, k]), n_demos=5).facts[0] for k in range(300)]
+    assert np.mean(clean) == pytest.approx(CLEAN, abs=0.08)
+
+
+def test_optional_steps_of_a_script_are_done_by_about_half():
+    rng = np.random.default_rng(0)
+    chances = np.concatenate([draw_task(rng, exact=True).chance for _ in range(300)])
+    optional = chances[chances < 1]
+    assert 0.35 < optional.min() < optional.max() < 0.8
