@@ -1,8 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from filtering.moments.counterparts import compare
-from filtering.moments.evidence.effects import OTHER_COLOUR, View, observe, usual_change
+from filtering.moments.evidence.effects import (
+    DOUBTFUL,
+    OTHER_COLOUR,
+    View,
+    observe,
+    usual_change,
+)
 from filtering.moments.evidence.recurring import recurrences
 from filtering.moments.peers.peers import everybody
 from tests.filtering.moments.toy_videos import HEIGHT, STEPS, toy_video
@@ -104,11 +112,30 @@ def lacked(shown):
 
 
 def test_who_lacks_a_quarter_of_a_usual_change_lacks_it():
-    shown = np.full((10, 8), SIZE)
-    shown[3, :2] = 0.0
-    assert lacked(shown).argmax() == 3
-    shown[3, 1] = SIZE
-    assert lacked(shown)[3] < lacked(np.where(np.arange(10)[:, None] == 3, 0.0, SIZE))[3] / 2
+    found = []
+    for cells in (4, 12, 48):
+        shown = np.full((10, 48), SIZE)
+        shown[3, :cells] = 0.0
+        assert lacked(shown).argmax() == 3
+        found.append(lacked(shown)[3])
+    assert found[0] < found[1] / 2
+    assert found[1] == found[2]
+
+
+def test_it_is_doubtful_what_a_video_shows_whose_counterparts_do_not_lead_back():
+    videos = [toy_video(range(STEPS), seed) for seed in range(5)]
+    found = compare([video.looks for video in videos], range(5))
+    astray = tuple(
+        tuple(
+            match._replace(at=match.at + 2 * DOUBTFUL) if match and d == 1 else match
+            for d, match in enumerate(row)
+        )
+        for row in found.back
+    )
+    for view in observe(replace(found, back=astray), videos).views:
+        for amounts in view.amounts:
+            assert np.isnan(amounts[1]).all() == (found.references[view.row] != 1)
+            assert not np.isnan(amounts[view.row]).any()
 
 
 def test_nothing_is_lacking_where_it_is_doubtful_what_a_video_shows():
