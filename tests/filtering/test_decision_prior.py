@@ -8,7 +8,7 @@ from filtering.judging.decision.description import describe
 from filtering.judging.decision.observed import Observed, canonical
 from filtering.judging.decision.prior.mistakes import skip
 from filtering.judging.decision.prior.noise import Noise, draw_noise, report
-from filtering.judging.decision.prior.pools import CLEAN, Group, draw_groups, draw_pool
+from filtering.judging.decision.prior.pools import CLEAN, draw_groups, draw_pool
 from filtering.judging.decision.prior.tasks import Task, draw_task
 from filtering.judging.norm.steps import StepList, count_steps
 
@@ -40,7 +40,7 @@ def part_of(out: tuple[int, ...]) -> float:
     """How surprising the largest part is that one of nine leaves out."""
     counts = count_steps(lists([list(range(STEPS))] * 8 + [left_out(*out)]), STEPS)
     omitted = 1 - counts.occurs
-    return float(largest_part(omitted, counts.occurs, counts)[-1])
+    return float(largest_part(omitted, counts)[-1])
 
 
 @pytest.mark.parametrize(
@@ -54,26 +54,31 @@ def test_neighbours_that_are_left_out_are_one_part(out, expected):
 def test_a_step_that_is_done_is_taken_off_a_part():
     counts = count_steps(lists([list(range(STEPS))] * 8 + [left_out(1, 2, 4, 5)]), STEPS)
     omitted = 2 * (1 - counts.occurs)
-    found = largest_part(omitted, counts.occurs, counts)[-1]
+    found = largest_part(omitted, counts)[-1]
     assert found == pytest.approx(8 - DONE)
 
 
 def test_steps_that_few_do_are_in_no_part():
     orders = [left_out(3)] * 8 + [list(range(STEPS)), left_out(2, 3, 4)]
     counts = count_steps(lists(orders), STEPS)
-    assert largest_part(1 - counts.occurs, counts.occurs, counts)[-1] == 2
+    assert largest_part(1 - counts.occurs, counts)[-1] == 2
 
 
-def test_durations_do_not_matter_where_steps_do_not_overlap():
+def test_durations_do_not_matter_where_steps_do_not_take_turns():
     orders = [list(range(STEPS))] * 5 + [left_out(2)]
     found = []
-    for scale in (1, 30):
+    for seed in (1, 2):
+        rng = np.random.default_rng(seed)
         steps = [
-            StepList(tuple(order), tuple(scale * (k + 1) for k in range(len(order))))
+            StepList(tuple(order), tuple(rng.integers(1, 500, len(order)).tolist()))
             for order in orders
         ]
-        found.append(describe(canonical(Observed(tuple(steps))).pool).rows)
-    assert np.array_equal(*found)
+        own = canonical(Observed(tuple(steps)))
+        described = describe(own.pool)
+        # The null is drawn at random, step by step in the order of their numbers.
+        known = [not name.startswith("null.") for name in described.names]
+        found.append(described.rows[np.argsort(own.rows)][:, known])
+    assert found[0] == pytest.approx(found[1], abs=1e-5)
 
 
 def test_who_skips_a_part_leaves_out_neighbours():
@@ -96,6 +101,7 @@ def test_labels_are_confused_with_those_of_about_the_same_time():
     away = [abs(noise(seed).alike - np.arange(30)[:, None]) for seed in range(20)]
     assert np.median(away) <= 2
     assert np.max(away) > 10
+    assert np.mean(np.array(away) > 10) > 0.03
 
 
 def test_segments_are_right_without_errors_and_keep_most_steps_with_them():
@@ -119,7 +125,6 @@ def test_people_with_an_order_each_share_no_incorrect_recipe():
     }
     assert not any(group.shared for group in drawn["orders"])
     assert any(group.shared for group in drawn["script"])
-    assert all(isinstance(group, Group) for group in drawn["orders"])
 
 
 def test_a_script_is_followed_by_half_of_a_pool_of_two_other_ways():

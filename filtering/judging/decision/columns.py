@@ -19,7 +19,8 @@ from filtering.judging.norm.steps import StepCounts
 from teasim.common.arrays import Array
 
 DONE = 1.5
-"""What a step that is done takes off the log-odds of a part that is left out [nats]."""
+"""What a step that is done takes off the log-odds of a part that is left out [nats]; set by hand,
+no other value was tried."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def largest(values: Array, count: int) -> Array:
     return np.asarray(-np.sort(-padded, axis=1)[:, :count])
 
 
-def largest_part(omitted: Array, occurs: Array, counts: StepCounts) -> Array:
+def largest_part(omitted: Array, counts: StepCounts) -> Array:
     """Return (D,): the log-odds of the most surprising part of the task that is left out.
 
     A segmenter loses steps here and there; who leaves out a part of a task leaves out neighbours. A
@@ -90,9 +91,9 @@ def largest_part(omitted: Array, occurs: Array, counts: StepCounts) -> Array:
 
     Args:
         omitted: (D, T) log-odds of the steps left out.
-        occurs: (D, T) 1 for those done.
         counts: counts of the pool.
     """
+    occurs = counts.occurs
     known = counts.both.sum(axis=(0, 1))
     place = counts.before.sum(axis=(0, 1)) / np.maximum(known, 1)
     usual = np.flatnonzero(occurs.mean(axis=0) >= 0.5)
@@ -119,7 +120,7 @@ def _steps(counts: StepCounts, trust: Array) -> tuple[dict[str, Array], Array, d
     columns |= {f"rare.{k}": v for k, v in enumerate(largest(rare, 3).T)}
     columns |= {
         "omitted.sum": omitted.sum(axis=1),
-        "omitted.part": largest_part(omitted, occurs, counts),
+        "omitted.part": largest_part(omitted, counts),
         "omitted.sure": ((1 - occurs) * (no < 0.5) * (yes > 2)).sum(axis=1),
         "omitted.others": np.where(some, no[rows, first], -1),
         "omitted.z": (surprise - usual).sum(axis=1) / np.sqrt(variance),

@@ -17,7 +17,10 @@ right or visibly not."""
 LARGEST_CHANCE = 0.5
 """Largest probability of one kind of error of a step."""
 ANY = 0.15
-"""Share of the labels that are confused with any other one, not with one of about the same time."""
+"""Share of the labels that are confused with any other one, and of stray segments of any label; the
+others are of about the same time."""
+CLOSE = 0.4
+"""Parameter of the geometric distribution of how many steps away that is."""
 SHORTEST_STRAY = 0.03
 """Shortest stray segment [mean duration of a step]; they are up to as long as a step."""
 
@@ -88,7 +91,7 @@ def _alike(rng: np.random.Generator, n_labels: int) -> NDArray[np.int64]:
 
 def _near(rng: np.random.Generator, place: int, count: int) -> int:
     """Return a place near to another one of `count`."""
-    away = int(rng.geometric(0.4)) * int(rng.choice([-1, 1]))
+    away = int(rng.geometric(CLOSE)) * int(rng.choice([-1, 1]))
     return min(max(place + away, 0), count - 1)
 
 

@@ -98,6 +98,7 @@ def draw_groups(rng: np.random.Generator, n_demos: int, style: str) -> list[Grou
 
 
 def _draw_sharing(rng: np.random.Generator, n_demos: int, script: bool) -> list[Group]:
+    """Draw the groups of people who may share an incorrect recipe."""
     kind = rng.random()
     if kind < 0.04:  # most of them, in the same way
         most = int(rng.uniform(0.52, 0.75) * n_demos)
