@@ -52,26 +52,26 @@ class SameConv(nn.Module):
     def __init__(self, inputs: int, outputs: int, kernel: int, stride: int, groups: int) -> None:
         """Create a `kernel` x `kernel` convolution."""
         super().__init__()
-        # SAME is symmetric at stride 1, where the convolution pads without copying the images.
-        self.asymmetric = stride > 1
-        padding = 0 if self.asymmetric else kernel // 2
-        self.conv = nn.Conv2d(inputs, outputs, kernel, stride, padding, groups=groups)
+        self.conv = nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups)
 
     def forward(self, images: Tensor) -> Tensor:
         """(n, inputs, H, W) -> (n, outputs, ceil(H / stride), ceil(W / stride))."""
-        if self.asymmetric:
-            images = functional.pad(images, self._padding(images))
-        result: Tensor = self.conv(images)
-        return result
+        conv = self.conv
+        return functional.conv2d(
+            images, self._weight(images), conv.bias, conv.stride, conv.padding, groups=conv.groups
+        )
 
-    def _padding(self, images: Tensor) -> list[int]:
-        """Return pixels to add left, right, above and below; the odd one goes right and below."""
-        kernel, stride = self.conv.kernel_size[0], self.conv.stride[0]
-        before_after: list[int] = []
-        for size in (images.shape[3], images.shape[2]):
-            total = max((-(-size // stride) - 1) * stride + kernel - size, 0)
-            before_after += [total // 2, total - total // 2]
-        return before_after
+    def _weight(self, images: Tensor) -> Tensor:
+        """Return the kernel, which has a first row and column of zeros where windows begin later.
+
+        At stride 2, SAME pads an even side by one pixel less before than after it. Zeros in the
+        kernel do that without copying the images, which takes a third of the time of the network.
+        """
+        weight = self.conv.weight
+        if self.conv.stride[0] == 1:
+            return weight
+        height, width = images.shape[2:]
+        return functional.pad(weight, (1 - width % 2, 0, 1 - height % 2, 0))
 
 
 class Block(nn.Module):
@@ -91,7 +91,7 @@ class Block(nn.Module):
         inner = images if self.expand is None else _relu6(self.expand(images))
         inner = _relu6(self.depthwise(inner))
         inner = self.project(inner)
-        return images + inner if self.skips else inner
+        return inner.add_(images) if self.skips else inner
 
 
 class EfficientNetLite0(nn.Module):
