@@ -109,13 +109,15 @@ class FilterConfig(JudgingConfig):
             segmenter = CLUSTERING
         elif segmenter == AUTO:
             segmenter = "predictions" if source.has_predictions else "logged"
-        return replace(self, score=score, segmenter=segmenter)
+        chosen = replace(self, score=score, segmenter=segmenter)
+        asked = chosen.decision == "learned" and score == COMBINED
+        return replace(chosen, decision="learned" if chosen.learns or asked else "clusters")
 
     @property
     def _is_plain(self) -> bool:
         """Whether no setting is given that the norm alone can follow."""
         told = any(getattr(self, name) for name in FOR_NORM)
-        return self.decision == "clusters" and not told
+        return self.decision != "learned" and not told
 
     def _check_names(self) -> None:
         # Imported here because the registries need SciPy, which `--help` must not wait for.

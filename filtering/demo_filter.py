@@ -51,6 +51,8 @@ NOT_THE_SAME = (
     "clustering finds are judged instead."
 )
 """Note on a pool whose segmenter is not confirmed by the counterparts of moments."""
+COST_UNUSED = "The cost of a miss was not used, because clusters decided, not the learned decision."
+"""Note on a cost that was given in vain."""
 ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features", "backbone")
 """Settings that need pictures."""
 
@@ -58,7 +60,7 @@ ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features", "ba
 def caution(count: int) -> str | None:
     """Return a warning for a small pool of `count` demonstrations, None for a larger one.
 
-    With three demonstrations, the score norm does not even flag one that lacks a step.
+    Of three demonstrations, a cut between clusters does not even flag one that lacks a step.
     """
     if count > FEW_DEMOS:
         return None
@@ -389,7 +391,9 @@ from the whole video.
     def _evidence(self, pool: Source, workers: Workers) -> Evidence:
         """Return the evidence that the score uses."""
         found = self.segments_
-        known = Evidence(found.subtasks, found.spans, reliability=found.reliability())
+        known = Evidence(
+            found.subtasks, found.spans, reliability=found.reliability(), told=found.told
+        )
         if self.chosen_.score == "equation3":
             return replace(known, states=self._states(pool, workers))
         ineffective = self._ineffective(pool, known, workers) if self.config.effects else None
@@ -467,9 +471,15 @@ from the whole video.
         self.summary_ = None
         if self._knows_steps:
             self.summary_ = summarise(self.segments_, self.weights_, self.flagged_, self.config)
-        decided = [f"{words}." for words in self.decision_.words] if self.decision_ else []
         warning = caution(len(self.weights_))
+        unused = self.config.cost != FilterConfig.cost and self.chosen_.decision != "learned"
         by_steps = self.summary_.words if self.summary_ else ()
+        split = any(words.startswith("No majority") for words in by_steps)
+        decided = [
+            f"{words[0].upper()}{words[1:]}."
+            for words in (self.decision_.words if self.decision_ else ())
+            if not (split and words.startswith("no majority: about half"))  # is said by steps
+        ]
         if self.chosen_.score == COMBINED:  # moments may see more than the found sub-tasks
             by_steps = tuple(
                 words
@@ -482,6 +492,7 @@ from the whole video.
             *decided,
             *by_steps,
             *([warning] if warning else []),
+            *([COST_UNUSED] if unused else []),
         )
 
     @contextmanager

@@ -157,7 +157,7 @@ def run_record(fitted: DemoFilter, pool: Source) -> dict[str, Any]:
         "trusted": float(fitted.trust_.sum()),
         "trust": _by_demo(fitted, fitted.trust_),
         "probability_incorrect": _by_demo(fitted, fitted.probabilities_),
-        "probability_is": PROBABILITY if fitted.decision_ is None else LEARNED,
+        "probability_is": LEARNED if fitted.chosen_.decision == "learned" else PROBABILITY,
         "decision": _decision_record(fitted),
         "words": list(fitted.words_),
         "tasks": _tasks_record(fitted),

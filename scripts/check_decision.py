@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from check_sequences import Drawn, clean_teas, recipes, salads, teas
@@ -47,7 +48,7 @@ class Result:
     """What is said about the pool; nothing where clusters decide."""
 
 
-def evidence(demos: Sequence[StepList]) -> Evidence:
+def evidence(demos: Sequence[StepList], *, told: bool) -> Evidence:
     """Return step lists as evidence."""
     spans = []
     for demo in demos:
@@ -57,13 +58,15 @@ def evidence(demos: Sequence[StepList]) -> Evidence:
             tuple(Span(str(a), b, c) for a, b, c in zip(demo.labels, starts, stops, strict=True))
         )
     number = 1 + max(max(demo.labels) for demo in demos)
-    return Evidence(tuple(map(str, range(number))), tuple(spans))
+    return Evidence(tuple(map(str, range(number))), tuple(spans), told=told)
 
 
-def judge(demos: Sequence[StepList], decision: str, groups: str = "auto") -> Result:
-    """Judge one pool."""
+def judge(
+    demos: Sequence[StepList], decision: str, groups: str = "auto", *, told: bool = True
+) -> Result:
+    """Judge one pool, whose segments are told or those of a segmenter."""
     config = JudgingConfig(decision=decision, groups=groups)
-    found: Judgement = by_norm(evidence(demos), config)
+    found: Judgement = by_norm(evidence(demos, told=told), config)
     learned = found.decision
     return Result(
         found.grouping.flagged,
@@ -71,6 +74,17 @@ def judge(demos: Sequence[StepList], decision: str, groups: str = "auto") -> Res
         found.grouping.groups,
         () if learned is None else learned.words,
     )
+
+
+class Row(NamedTuple):
+    """Pools of one kind."""
+
+    name: str
+    """What they are."""
+    pools: Iterable[Drawn]
+    """The pools."""
+    told: bool = True
+    """Whether their segments are told; otherwise a segmenter found them."""
 
 
 def subsets(root: Path) -> dict[str, list[Drawn]]:
@@ -159,28 +173,32 @@ def three_people(pools: int) -> Iterator[Drawn]:
         yield from tea(parts, 1, 1000 + number)
 
 
-def tea_rows(pools: int) -> Iterator[tuple[str, Iterable[Drawn]]]:
+def tea_rows(pools: int) -> Iterator[Row]:
     """Yield the rows of step lists."""
     usual = constant(SEQ_1)
-    yield "12 seq_1", tea([(usual, 12, False)], pools, 1)
+    yield Row("12 seq_1", tea([(usual, 12, False)], pools, 1))
     for name, kind in (("seq_2", constant(SEQ_2)), ("seq_3", seq_3)):
         for k in (1, 2, 4, 6, 8):
-            yield f"10 seq_1 + {k} {name}", tea([(usual, 10, False), (kind, k, True)], pools, k)
+            yield Row(
+                f"10 seq_1 + {k} {name}", tea([(usual, 10, False), (kind, k, True)], pools, k)
+            )
     for name, kind in (("extra", extra), ("repeat", repeated)):
         for k in (1, 2, 4):
-            yield f"10 seq_1 + {k} {name}", tea([(usual, 10, False), (kind, k, True)], pools, k)
-    yield "14 legal orders", tea([(legal, 14, False)], pools, 2)
-    yield "three people, 5 + 5 + 4", three_people(pools)
-    yield "14 with optional milk, sugar", tea([(optional, 14, False)], pools, 3)
+            yield Row(
+                f"10 seq_1 + {k} {name}", tea([(usual, 10, False), (kind, k, True)], pools, k)
+            )
+    yield Row("14 legal orders", tea([(legal, 14, False)], pools, 2))
+    yield Row("three people, 5 + 5 + 4", three_people(pools))
+    yield Row("14 with optional milk, sugar", tea([(optional, 14, False)], pools, 3))
     omits = constant([name for name in SEQ_1 if name != CRITICAL[0]])
-    yield "8 lack a step, 6 do not", tea([(omits, 8, True), (usual, 6, False)], pools, 4)
+    yield Row("8 lack a step, 6 do not", tea([(omits, 8, True), (usual, 6, False)], pools, 4))
 
 
-def folder_rows(root: Path, pools: int) -> Iterator[tuple[str, Iterable[Drawn]]]:
+def folder_rows(root: Path, pools: int) -> Iterator[Row]:
     """Yield the rows of the data sets that are there."""
     if (root / "captaincook4d").is_dir():
         for name, drawn in subsets(root / "captaincook4d").items():
-            yield f"CaptainCook4D, {name}", drawn
+            yield Row(f"CaptainCook4D, {name}", drawn)
     if (root / "50salads").is_dir():
         for source, true_labels in (("true", True), ("predicted", False)):
             for k in (0, 1, 2, 4, 6):
@@ -188,22 +206,22 @@ def folder_rows(root: Path, pools: int) -> Iterator[tuple[str, Iterable[Drawn]]]
                 drawn = salads(
                     root / "50salads", k, pools, correct_ones=count, true_labels=true_labels
                 )
-                yield f"50-Salads, {source}, {count} + {k}", drawn
+                yield Row(f"50-Salads, {source}, {count} + {k}", drawn, true_labels)
     if (root / "tea_unh").is_dir():
-        yield "UNH tea, clean", clean_teas(root / "tea_unh", pools)
+        yield Row("UNH tea, clean", clean_teas(root / "tea_unh", pools))
         for k in (1, 4, 8):
-            yield f"UNH tea, deletions, 10 + {k}", teas(root / "tea_unh", k, pools)
+            yield Row(f"UNH tea, deletions, 10 + {k}", teas(root / "tea_unh", k, pools))
 
 
-def table(rows: Iterable[tuple[str, Iterable[Drawn]]], decisions: Sequence[str]) -> None:
+def table(rows: Iterable[Row], decisions: Sequence[str]) -> None:
     """Print one line per row, then the calibration of each decision over all rows."""
     everything: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {name: [] for name in decisions}
     print(f"{'':32}" + "".join(f"| {name}: recall accused silent brier " for name in decisions))
-    for name, drawn in rows:
+    for name, drawn, told in rows:
         pools = list(drawn)
         text, words = f"{name:32}", ""
         for decision in decisions:
-            found = [judge(demos, decision) for demos, _ in pools]
+            found = [judge(demos, decision, told=told) for demos, _ in pools]
             truths = [np.array(wrong) for _, wrong in pools]
             everything[decision] += [(r.p, t) for r, t in zip(found, truths, strict=True)]
             text += _cells(found, truths, len(decision))

@@ -101,9 +101,12 @@ def bank(
 class Draws:
     """Draws pools from the bank and judges them."""
 
-    def __init__(self, demos: Sequence[Demo], subtasks: tuple[str, ...], pools: int) -> None:
-        """Keep the bank; `pools` are drawn for every row."""
-        self.demos, self.subtasks, self.pools = demos, subtasks, pools
+    def __init__(
+        self, demos: Sequence[Demo], subtasks: tuple[str, ...], arguments: argparse.Namespace
+    ) -> None:
+        """Keep the bank."""
+        self.demos, self.subtasks, self.pools = demos, subtasks, arguments.pools
+        self.told, self.decision = arguments.segmenter == "logged", arguments.decision
 
     def judge(
         self,
@@ -127,11 +130,11 @@ class Draws:
         self, demos: Sequence[Demo], wrong: np.ndarray, config: FilterConfig = USUAL
     ) -> Outcome:
         """Judge one pool."""
-        known = Evidence(self.subtasks, tuple(demo.spans for demo in demos))
+        known = Evidence(self.subtasks, tuple(demo.spans for demo in demos), told=self.told)
         changed = [demo.changes for demo in demos if demo.changes is not None]
         if changed:
             known = replace(known, ineffective=effect_surprises(changed, known.labels))
-        return Outcome(by_norm(known, config), wrong)
+        return Outcome(by_norm(known, replace(config, decision=self.decision)), wrong)
 
     def _draw(self, kind: str, count: int, rng: np.random.Generator) -> list[Demo]:
         able = [demo for demo in self.demos if demo.sequence == kind and _plain(demo)]
@@ -223,6 +226,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("bank", nargs="+", type=Path, metavar="POOL")
     parser.add_argument("--segmenter", required=True, help="logged, clustering or a folder")
+    parser.add_argument("--decision", default="clusters", help="clusters or learned")
     parser.add_argument("--table", choices=TABLES, default="orders")
     parser.add_argument("--no-effects", action="store_true", help="use the steps alone")
     parser.add_argument("--pools", type=int, default=30, help="random pools per row")
@@ -231,7 +235,7 @@ def main() -> int:
     effects = not arguments.no_effects
     demos, subtasks = bank(arguments.bank, arguments.segmenter, effects, Workers(arguments.jobs))
     print(f"bank: {len(demos)} demonstrations")
-    TABLES[arguments.table](Draws(demos, subtasks, arguments.pools))
+    TABLES[arguments.table](Draws(demos, subtasks, arguments))
     return 0
 
 

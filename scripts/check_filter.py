@@ -38,6 +38,7 @@ def main() -> int:
     parser.add_argument("--seq1", type=int, default=10, help="correct demonstrations in each")
     parser.add_argument("--seq3", type=int, default=4, help="incorrect demonstrations in each")
     parser.add_argument("--segmenter", default="auto", help="as in teasim filter")
+    parser.add_argument("--decision", default="auto", help="as in teasim filter")
     parser.add_argument("--jobs", type=int, default=default_jobs(), help="processes")
     arguments = parser.parse_args()
     worst = 0
@@ -58,7 +59,7 @@ def check(arguments: argparse.Namespace, seed: int) -> Counts:
         if finished
         else generate(root, config, workers=Workers(arguments.jobs)).pool
     )
-    settings = FilterConfig(segmenter=arguments.segmenter)
+    settings = FilterConfig(segmenter=arguments.segmenter, decision=arguments.decision)
     flagged = DemoFilter(settings).fit(pool, workers=Workers(arguments.jobs)).flagged_
     correct = [episode.record.correct for episode in pool.episodes if episode.record is not None]
     pairs = list(zip(flagged.tolist(), correct, strict=True))

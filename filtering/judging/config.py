@@ -44,15 +44,17 @@ class JudgingConfig:
     most of the pool does), combined (the graver verdict of these two) or equation3 (the next-step
     model of the paper). auto: combined for videos alone, or else norm."""
     groups: str = "auto"
-    """Number of groups: auto (kept; with the score norm also out of order and steps left out), 1
+    """Number of groups: auto (kept; also out of order, steps left out and, unless clusters decide,
+    extra steps), 1
     (nothing is flagged), 2 or 3."""
     threshold: float | str = "auto"
     """Weight below which a demonstration is flagged: a number between 0 and 1, auto (the rule of
     the score), or the mid-points between groups of weights found by kmeans, gmm or minibatch."""
-    decision: str = "clusters"
-    """How losses become flags: clusters (a cut between clusters of the losses), or learned (the
-    probability of being incorrect, given the whole pool). Only clusters are used where groups,
-    threshold or tolerance are given, and for the score equation3."""
+    decision: str = "auto"
+    """How the score norm decides who is flagged: learned (by the probability of being incorrect,
+    given the whole pool), or clusters (by a cut between clusters of the losses). auto: learned, but
+    clusters in the score combined. Where groups, threshold or tolerance are given, and for the
+    score equation3, only clusters are used."""
     cost: float = 2.0
     """False alarms that a miss is worth: the learned decision flags demonstrations that are
     incorrect with a probability above 1 / (1 + cost)."""
@@ -89,9 +91,9 @@ class JudgingConfig:
         """
         if not 0.0 <= self.tolerance < 1.0:
             raise ConfigError(f"tolerance is {self.tolerance}; choose a share from 0 to below 1.")
-        if self.decision not in DECISIONS:
+        if self.decision not in ("auto", *DECISIONS):
             raise ConfigError(
-                f"Unknown decision '{self.decision}'; choose {' or '.join(DECISIONS)}."
+                f"Unknown decision '{self.decision}'; choose auto, {' or '.join(DECISIONS)}."
             )
         if self.judged_by not in JUDGED_BY:
             raise ConfigError(f"judged_by is '{self.judged_by}'; choose {', '.join(JUDGED_BY)}.")
@@ -112,7 +114,7 @@ class JudgingConfig:
         """Whether the learned decision is used."""
         plain = self.groups == "auto" and self.threshold == "auto"
         named = self.score in ("auto", "norm")
-        return self.decision == "learned" and named and plain and not self.tolerance
+        return self.decision != "clusters" and named and plain and not self.tolerance
 
     @property
     def by_w(self) -> bool:

@@ -28,7 +28,9 @@ class Evidence:
 
     reliability: Sequence[Array] | None = None
     """Per demonstration (q,): mean probability that the segmenter gives the label of each segment;
-    None where segments were given, not inferred."""
+    None where it gives none."""
+    told: bool = False
+    """Whether people or the environment labelled the segments, not a segmenter, which errs more."""
 
     @cached_property
     def labels(self) -> list[list[int]]:

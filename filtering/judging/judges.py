@@ -1,16 +1,18 @@
 """From evidence to weights and groups: the two scores behind one interface.
 
-* `norm`, the default: the losses of `norm_score` plus those of ineffective steps, cut and grouped
-  by `norm.cut`.
+* `norm`, the default: the losses of `norm_score` plus those of ineffective steps. Who is flagged is
+  decided by the learned `decision`, or by `norm.cut` between clusters of the losses.
 * `equation3`: the conditional next-step model of the paper, trimmed. Either its weights w
   themselves are clustered, as published, or each demonstration is scored by models of the others.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from filtering.judging.config import JudgingConfig
 from filtering.judging.equation3.problem import Problem
@@ -58,11 +60,12 @@ def by_norm(evidence: Evidence, config: JudgingConfig) -> Judgement:
     """
     rules = rules_of(config, evidence.subtasks)
     charges = charges_of(rules, evidence.labels, evidence.places)
-    return ruled(_by_usual(legal_evidence(evidence, rules), config), charges)
+    obeys = np.array([not own for own in charges])
+    return ruled(_by_usual(legal_evidence(evidence, rules), config, obeys), charges)
 
 
-def _by_usual(evidence: Evidence, config: JudgingConfig) -> Judgement:
-    """Judge without rules of the user."""
+def _by_usual(evidence: Evidence, config: JudgingConfig, obeys: NDArray[np.bool_]) -> Judgement:
+    """Judge by what is usual; `obeys` (D,) is True for those that break no rule of the user."""
     n_groups = 3 if config.groups == "3" else 2
     found = score_steps(evidence.counts, tolerance=config.tolerance, n_groups=n_groups)
     ineffective = ineffective_losses(found, evidence)
@@ -75,7 +78,7 @@ def _by_usual(evidence: Evidence, config: JudgingConfig) -> Judgement:
             findings, find_extras(evidence.labels, found.trust, evidence.places)
         )
         extra = np.array([bool(own) and own[0].extra is not None for own in findings])
-        decision = _learned(evidence, config.cost)
+        decision = _learned(evidence, config.cost, obeys)
         numbers, names = by_nature(decision.flagged, left_out, extra)
         grouping = Grouping(numbers, (1 - decision.cut) * (numbers.max() > 0), names)
         p = decision.probabilities
@@ -98,11 +101,22 @@ def _with_extras(
     )
 
 
-def _learned(evidence: Evidence, cost: float) -> "PoolDecision":
+def _learned(evidence: Evidence, cost: float, obeys: NDArray[np.bool_]) -> "PoolDecision":
+    """Return the learned decision; those that break no rule are judged among themselves.
+
+    What is said about the pool is then said about these, if they are enough to be judged.
+    """
     # Imported here because torch takes a second.
     from filtering.judging.decision import decide as learned
 
-    return learned.decide(learned.observed(evidence), cost)
+    pool = learned.observed(evidence)
+    found = learned.decide(pool, cost)
+    if obeys.all() or obeys.sum() < learned.FEWEST:
+        return found
+    rest = learned.decide(pool.chosen(np.flatnonzero(obeys)), cost)
+    probabilities = found.probabilities.copy()
+    probabilities[obeys] = rest.probabilities
+    return replace(rest, probabilities=probabilities)
 
 
 def ineffective_losses(found: NormScore, evidence: Evidence) -> list[Array]:

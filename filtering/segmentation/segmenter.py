@@ -20,7 +20,7 @@ def logged(source: Source, *, workers: Workers = IN_PROCESS) -> Segmentation:
     """
     del workers  # nothing to compute
     spans = [demo.spans() for demo in source.episodes]
-    return Segmentation(_names(source, spans), _checked(source, spans, "logged"))
+    return Segmentation(_names(source, spans), _checked(source, spans, "logged"), told=True)
 
 
 def predictions(source: Source, *, workers: Workers = IN_PROCESS) -> Segmentation:

@@ -27,13 +27,15 @@ class Segmentation:
     """Per demonstration its q segments in order of time [frames]."""
     posteriors: tuple[NDArray[np.float32], ...] | None = None
     """Per demonstration (frames, T): probability of each sub-task in each frame; 1 minus the sum of
-    a row is the probability of no sub-task. None where segments were given, not inferred."""
+    a row is the probability of no sub-task. None where the segmenter gives none."""
     labelled: frozenset[str] = frozenset()
     """demo_id of the demonstrations whose true labels the segmenter was fitted to."""
     cameras: tuple[str, ...] = ()
     """Cameras whose pictures were looked at; empty where segments were given."""
     weights_sha256: str | None = None
     """Hash of the weights of the segmenter; None where segments were given."""
+    told: bool = False
+    """Whether people or the environment labelled the segments, not a segmenter."""
 
     def labels(self) -> list[list[int]]:
         """Return per demonstration the label numbers of its segments, 0..T-1."""
@@ -42,7 +44,7 @@ class Segmentation:
     def confidence(self) -> float | None:
         """Return the mean probability of the most probable label of a frame, over all frames.
 
-        None where segments were given, not inferred.
+        None where the segmenter gives no posteriors.
         """
         if self.posteriors is None:
             return None
@@ -51,7 +53,7 @@ class Segmentation:
     def reliability(self) -> list[NDArray[np.float64]] | None:
         """Return per demonstration (q,): mean posterior of the label of each segment.
 
-        None where segments were given, not inferred.
+        None where the segmenter gives no posteriors.
         """
         if self.posteriors is None:
             return None

@@ -18,8 +18,9 @@ from teasim.common import parallel
 from teasim.common.files import write_json
 from teasim.common.workers import IN_PROCESS, Workers
 
-FORMAT = 1
-"""Number of the form of stored results; a change makes all earlier ones count as absent."""
+FORMAT = 2
+"""Number of the form of stored results and of the methods; a change makes all earlier ones count as
+absent."""
 RECORDED = ("teasim", "mujoco", "torch", "numpy", "scipy", "scikit-learn")
 """Packages whose versions stand in every result."""
 

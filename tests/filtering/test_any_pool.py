@@ -62,7 +62,8 @@ def test_other_numbers_of_sub_tasks(name: str, n_subtasks: int) -> None:
 def test_what_two_of_three_or_four_share_is_not_found(name: str, usual: int) -> None:
     """The law behind `caution`."""
     pool = [[0, 1, 2, 3, 4, 5]] * usual + [[0, 1, 2, 3, 5]] * 2
-    assert not JUDGES[name](evidence(pool), RULE).grouping.flagged[usual:].any()
+    rule = JudgingConfig(decision="clusters")
+    assert not JUDGES[name](evidence(pool), rule).grouping.flagged[usual:].any()
 
 
 def test_thousands_of_demonstrations_are_scored() -> None:

@@ -9,7 +9,7 @@ from filtering import DemoFilter, FilterConfig
 from filtering.by_task import fit_by_task, of_task
 from filtering.judging.explain import Counterpart, Finding
 from filtering.moments.suitable import UnsuitableError
-from filtering.output import write_filter_output
+from filtering.output import LEARNED, write_filter_output
 from filtering.segmentation.segments import Segmentation
 from teasim.common.errors import ConfigError
 from teasim.pool import Span
@@ -83,7 +83,9 @@ def test_the_output_tells_tasks_apart(pool, tmp_path):
     assert [row.task for row in rows] == ["tea", "coffee"] * 6 + ["tea", "a rare one"]
     assert [row.weight for row in rows if row.task == "a rare one"] == [1.0]
     assert rows[13].reason.startswith("Too few demonstrations to judge, so that all are kept: 1 of")
-    record = json.loads((tmp_path / "out" / "filter.json").read_text())["tasks"]
+    whole = json.loads((tmp_path / "out" / "filter.json").read_text())
+    assert whole["probability_is"] == LEARNED
+    record = whole["tasks"]
     assert [(one["judged"], len(one["demonstrations"]), one["flagged"]) for one in record] == [
         *((True, 7, 1), (True, 6, 1), (False, 1, 0)),
     ]

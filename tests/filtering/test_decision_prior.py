@@ -1,14 +1,35 @@
 """What the prior of the learned decision draws, and the columns that tell it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from filtering.judging.decision.columns import DONE, largest_part
 from filtering.judging.decision.description import describe
 from filtering.judging.decision.observed import Observed, canonical
+from filtering.judging.decision.prior.effects import (
+    HIDDEN,
+    UNSEEN,
+    Sight,
+    draw_sight,
+    surprises,
+)
 from filtering.judging.decision.prior.mistakes import skip
-from filtering.judging.decision.prior.noise import Noise, draw_noise, report
-from filtering.judging.decision.prior.pools import CLEAN, draw_groups, draw_pool
+from filtering.judging.decision.prior.noise import (
+    LARGEST_RATE,
+    LARGEST_SLIP,
+    LEAST_RATE,
+    LEAST_SLIP,
+    NOISELESS,
+    SLIPS,
+    TOLD,
+    Noise,
+    draw_noise,
+    report,
+)
+from filtering.judging.decision.prior.people import CLEAN, STYLE_SHARES, STYLES, draw_people
+from filtering.judging.decision.prior.pools import _largest_way, draw_groups, draw_pool
 from filtering.judging.decision.prior.tasks import Task, draw_task
 from filtering.judging.norm.steps import StepList, count_steps
 
@@ -117,6 +138,54 @@ def test_segments_are_right_without_errors_and_keep_most_steps_with_them():
     assert 0.7 < np.mean(kept) < 1
 
 
+def test_told_segments_hardly_err_and_have_no_reliability():
+    drawn = [draw_noise(np.random.default_rng(seed), 10, exact=True) for seed in range(400)]
+    told, found = [one for one in drawn if one.told], [one for one in drawn if not one.told]
+    assert np.mean([one.told for one in drawn]) == pytest.approx(NOISELESS * TOLD, abs=0.07)
+    assert all(one.trust == 0 for one in told)
+    assert any(one.trust > 0 for one in found)
+    slips = [one.rate for one in told if one.rate > 0]
+    assert len(slips) / len(told) == pytest.approx(SLIPS, abs=0.15)
+    assert LEAST_SLIP <= min(slips) < max(slips) <= LARGEST_SLIP
+    errs = [one.rate for one in found if one.rate > 0]
+    assert LEAST_RATE <= min(errs) < max(errs) <= LARGEST_RATE
+    assert any(one.rate == 0 for one in found)
+
+
+def test_drawn_pools_say_whether_their_segments_are_told():
+    pools = [draw_pool(np.random.default_rng([8, k]), n_demos=5).observed for k in range(60)]
+    assert {pool.told for pool in pools} == {False, True}
+    assert all(pool.reliability is None for pool in pools if pool.told)
+
+
+def test_who_leaves_out_an_optional_step_keeps_the_order_of_the_others():
+    chance = np.ones(STEPS)
+    chance[3] = 0.5
+    task = replace(line(), chance=chance)
+    orders = [list(range(STEPS)), left_out(3), [1, 0, *range(2, STEPS)], left_out(5)]
+    correct = np.array([False, False, False, True])
+    assert _largest_way(task, orders, correct) == (2, 2)
+    assert _largest_way(line(), orders, correct) == (1, 3)
+
+
+def test_segments_without_effect_surprise_and_others_seldom_do():
+    rng = np.random.default_rng(2)
+    sight = Sight(doubtful=0.05, haze=0.5, clear=8.0)
+    usual = surprises(rng, sight, np.zeros(20_000, bool))
+    assert (usual >= 0).all()
+    assert (usual > 0).mean() == pytest.approx(sight.doubtful + HIDDEN, abs=0.01)
+    useless = surprises(rng, sight, np.ones(20_000, bool))
+    seen = useless[useless > 1.5]
+    assert len(seen) / len(useless) == pytest.approx(1 - UNSEEN, abs=0.03)
+    assert seen.mean() == pytest.approx(sight.clear, rel=0.1)
+
+
+def test_effects_are_seen_worse_in_some_pools():
+    drawn = [draw_sight(np.random.default_rng(seed)) for seed in range(200)]
+    assert max(one.doubtful for one in drawn) > 5 * min(one.doubtful for one in drawn)
+    assert min(one.clear for one in drawn) > 2 * max(one.haze for one in drawn)
+
+
 def test_people_with_an_order_each_share_no_incorrect_recipe():
     rng = np.random.default_rng(0)
     drawn = {
@@ -137,7 +206,13 @@ def test_a_script_is_followed_by_half_of_a_pool_of_two_other_ways():
 
 def test_a_share_of_the_pools_is_clean():
     clean = [draw_pool(np.random.default_rng([7, k]), n_demos=5).facts[0] for k in range(300)]
-    assert np.mean(clean) == pytest.approx(CLEAN, abs=0.08)
+    assert np.mean(clean) == pytest.approx(np.dot(STYLE_SHARES, CLEAN), abs=0.08)
+
+
+def test_who_varies_much_errs_more_often():
+    people = [draw_people(np.random.default_rng(seed)) for seed in range(100)]
+    assert {one.style: one.clean for one in people} == dict(zip(STYLES, CLEAN, strict=True))
+    assert max(CLEAN[3:]) < min(CLEAN[:3])
 
 
 def test_optional_steps_of_a_script_are_done_by_about_half():

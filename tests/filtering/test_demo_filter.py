@@ -31,6 +31,30 @@ def test_incorrect_demonstrations_are_flagged_with_the_right_reason(
     assert [bool(reason) for reason in toy_filter.reasons_] == WRONG
 
 
+@pytest.mark.parametrize("segmenter", ["logged", "clustering"])
+def test_the_judge_knows_whether_segments_are_told(
+    toy_pool: Pool, monkeypatch: pytest.MonkeyPatch, segmenter: str
+) -> None:
+    seen = []
+
+    def judge(evidence, config):
+        seen.append(evidence.told)
+        return JUDGES["norm"](evidence, config)
+
+    monkeypatch.setattr(filtering.demo_filter, "judge_named", lambda _: judge)
+    found = DemoFilter(FilterConfig(score="norm", segmenter=segmenter)).fit(toy_pool)
+    assert seen == [segmenter == "logged"]
+    assert found.chosen_.decision == "learned"
+
+
+def test_the_learned_decision_in_the_score_combined_is_taken_when_asked_for(
+    toy_pool: Pool,
+) -> None:
+    asked = FilterConfig(score="combined", decision="learned").for_source(toy_pool)
+    assert asked.decision == "learned"
+    assert FilterConfig(score="combined").for_source(toy_pool).decision == "clusters"
+
+
 def test_weights_and_trust_are_shares(toy_filter: DemoFilter) -> None:
     for shares in (toy_filter.weights_, toy_filter.trust_):
         assert ((shares >= 0) & (shares <= 1)).all()

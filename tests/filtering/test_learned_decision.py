@@ -215,7 +215,7 @@ def test_other_settings_leave_the_decision_to_clusters(setting) -> None:
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ({"decision": "votes"}, "Unknown decision 'votes'; choose learned or clusters."),
+        ({"decision": "votes"}, "Unknown decision 'votes'; choose auto, learned or clusters."),
         ({"cost": 0.0}, "cost is 0.0; choose a number above 0."),
         ({"cost": float("inf")}, "cost is inf; choose a number above 0."),
     ],
@@ -226,13 +226,68 @@ def test_settings_out_of_range_are_refused(setting, message) -> None:
     assert str(caught.value) == message
 
 
+@pytest.mark.parametrize(
+    ("setting", "learns"),
+    [
+        ({}, True),
+        ({"score": "norm"}, True),
+        ({"decision": "clusters"}, False),
+        ({"score": "combined"}, False),
+        ({"score": "moments"}, False),
+        ({"score": "equation3"}, False),
+        ({"groups": "2"}, False),
+        ({"threshold": "kmeans"}, False),
+        ({"tolerance": 0.1}, False),
+    ],
+)
+def test_the_norm_alone_uses_the_learned_decision(setting, learns) -> None:
+    assert JudgingConfig(**setting).learns == learns
+
+
+def test_a_column_says_whether_segments_are_told() -> None:
+    pool = pool_of([[0, 1, 2]] * 4)
+    for told in (False, True):
+        found = describe(replace(pool, told=told))
+        assert (found.rows[:, found.names.index("told")] == told).all()
+        assert canonical(replace(pool, told=told)).pool.told == told
+        assert replace(pool, told=told).chosen([1, 0, 2]).told == told
+
+
+def columns_of(orders: list[list[int]]) -> dict[str, list[float]]:
+    found = describe(pool_of(orders))
+    return {name: values.tolist() for name, values in zip(found.names, found.rows.T, strict=True)}
+
+
+def test_groups_that_do_the_same_are_counted() -> None:
+    found = columns_of([[0, 1, 2, 3]] * 5 + [[0, 2, 1, 3]] * 3 + [[0, 1, 3]] * 2)
+    assert found["lists: own"] == pytest.approx([0.5] * 5 + [0.3] * 3 + [0.2] * 2)
+    assert found["lists: larger"] == [0] * 5 + [1] * 3 + [2] * 2
+    assert found["lists: lead"] == pytest.approx([0] * 5 + [-0.2] * 3 + [-0.3] * 2)
+    whole = {"largest": 0.5, "second": 0.3, "third": 0.2, "others": 0.0, "number": 0.3}
+    for what, expected in whole.items():
+        assert found[f"lists: {what}"] == pytest.approx([expected] * 10)
+    assert found["steps: own"] == pytest.approx([0.8] * 8 + [0.2] * 2)
+    assert found["steps: largest"] == pytest.approx([0.8] * 10)
+    assert found["steps: third"] == [0] * 10
+
+
+def test_those_whose_order_is_kept_are_counted() -> None:
+    found = columns_of([[0, 1, 2, 3]] * 5 + [[0, 2, 1, 3]] * 3 + [[0, 1, 3]] * 2)
+    assert found["kept"] == pytest.approx([0.7] * 5 + [0.5] * 3 + [1.0] * 2)
+    for what, expected in (("most", 1.0), ("median", 0.7), ("least", 0.5)):
+        assert found[f"kept: {what}"] == pytest.approx([expected] * 10)
+
+
 def test_evidence_is_read_whole() -> None:
     known = replace(
         evidence([[0, 1], [1, 0]]),
+        told=True,
         reliability=[np.ones(2), np.zeros(2)],
         ineffective=[np.zeros(2), np.ones(2)],
     )
     pool = observed(known)
+    assert pool.told
+    assert not observed(replace(known, told=False)).told
     assert [demo.labels for demo in pool.steps] == [(0, 1), (1, 0)]
     assert [demo.lengths for demo in pool.steps] == [(10, 10), (10, 10)]
     assert pool.reliability is not None

@@ -172,6 +172,8 @@ def test_posteriors_come_along_when_every_video_has_them(folder: Path) -> None:
     assert found is not None
     assert found[4].shape == (len(NO_WATER), 7)
     assert segmenter_named("logged")(pool).posteriors is None
+    assert segmenter_named("logged")(pool).told
+    assert not segmenter_named("predictions")(pool).told
     (folder / "posteriors" / "v1.npy").unlink()
     assert segmenter_named("predictions")(pool).posteriors is None
 

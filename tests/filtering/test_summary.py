@@ -62,12 +62,14 @@ def test_a_repeated_step_is_the_reason_of_the_learned_decision(tmp_path: Path) -
 def test_a_majority_that_omits_a_step_is_never_kept_in_silence(decision, tmp_path) -> None:
     found = fitted(tmp_path / "p", [USUAL] * 4 + [NO_WATER] * 8, decision=decision)
     assert any("the majority may be wrong" in words for words in found.words_)
-    told = fitted(tmp_path / "q", [USUAL] * 4 + [NO_WATER] * 8, critical=("add_water",))
+    rules = {"critical": ("add_water",), "decision": decision}
+    told = fitted(tmp_path / "q", [USUAL] * 4 + [NO_WATER] * 8, **rules)
     assert told.flagged_.tolist() == [False] * 4 + [True] * 8
-    assert told.words_[0] == (
+    no_majority = (
         "No majority: 8 of 12 demonstrations are flagged. What is usual in this pool may itself "
         "be wrong."
     )
+    assert no_majority in told.words_
 
 
 def test_terminal_record_and_page_say_the_same(tmp_path: Path, capsys) -> None:
@@ -77,21 +79,23 @@ def test_terminal_record_and_page_say_the_same(tmp_path: Path, capsys) -> None:
     printed = capsys.readouterr().out
     record = json.loads((tmp_path / "out" / "filter.json").read_text())
     page = html.unescape((tmp_path / "out" / "report.html").read_text())
-    assert len(record["words"]) == 2
+    assert len(record["words"]) == 3
     for words in record["words"]:
         assert words in printed.splitlines()
         assert words in page
-    assert record["words"][0].startswith("No majority: 3 of 9 (flagged) do add_sugar before")
+    assert record["words"][0] == "Contaminated: some demonstrations are probably incorrect."
+    assert record["words"][1].startswith("No majority: 3 of 9 (flagged) do add_sugar before")
     assert [len(one["demonstrations"]) for one in record["sequences"]] == [6, 3]
     assert record["risk_of_leaving_out"]["stir"] == CRITICAL_RISK
-    assert "0.95 stir (as told)" in record["words"][1]
+    assert "0.95 stir (as told)" in record["words"][2]
 
 
 def test_every_decision_writes_p_group_and_reason(tmp_path: Path) -> None:
     videos = {f"v{k:02d}": np.repeat(o, 4) for k, o in enumerate([USUAL] * 9 + [NO_WATER] * 2)}
     write_predictions(tmp_path / "p", SEQ_1, videos, {}, {})
     for name, options in {
-        "clusters": [],
+        "auto": [],
+        "clusters": ["--decision", "clusters"],
         "learned": ["--decision", "learned"],
         "number": ["--threshold", "0.4"],
         "gmm": ["--threshold", "gmm", "--groups", "2"],
@@ -104,6 +108,12 @@ def test_every_decision_writes_p_group_and_reason(tmp_path: Path) -> None:
         assert all(row.p_incorrect is not None for row in rows)
         assert min(row.p_incorrect for row in rows[9:]) > max(row.p_incorrect for row in rows[:9])
         assert all(row.group > 0 and row.reason for row in rows[9:])
+
+
+def test_a_cost_that_is_not_used_is_named(tmp_path: Path) -> None:
+    for decision, named in (("learned", False), ("clusters", True)):
+        found = fitted(tmp_path / decision, [USUAL] * 6, decision=decision, cost=5.0)
+        assert any("cost of a miss was not used" in words for words in found.words_) == named
 
 
 def test_risk_grows_with_those_who_never_leave_it_out() -> None:

@@ -48,7 +48,7 @@ def evidence(kinds):
     names = tuple(sorted(SEQ_1))
     demos = [STEPS[kind] for kind, count in kinds for _ in range(count)]
     states = [np.eye(len(names))[[names.index(name) for name in steps]] for steps in demos]
-    return Evidence(names, tuple(map(spans, demos)), states=states)
+    return Evidence(names, tuple(map(spans, demos)), states=states, told=True)
 
 
 def fake_bank(unit, store, workers):

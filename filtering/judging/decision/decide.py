@@ -15,6 +15,8 @@ from filtering.judging.decision.prior.pools import FACTS, MOST_DEMOS
 from filtering.judging.evidence import Evidence
 from teasim.common.arrays import Array
 
+FEWEST = 3
+"""Fewest demonstrations of a pool that is judged."""
 ROUNDS = 3
 """Number of random divisions of a larger pool into groups of at most MOST_DEMOS."""
 LIKELY = 0.5
@@ -100,11 +102,12 @@ def observed(evidence: Evidence) -> Observed:
         evidence.step_lists,
         None if reliability is None else tuple(reliability),
         None if ineffective is None else tuple(ineffective),
+        evidence.told,
     )
 
 
 def decide(pool: Observed, cost: float, model: DecisionModel | None = None) -> PoolDecision:
-    """Judge a pool of 3 or more demonstrations.
+    """Judge a pool of FEWEST or more demonstrations.
 
     The result depends neither on the names of labels nor on the order of the demonstrations, and
     is the same for demonstrations that cannot be told apart.

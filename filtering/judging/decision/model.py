@@ -18,7 +18,7 @@ from filtering.vision.determinism import one_thread
 from teasim.common.arrays import Array
 from teasim.common.checkpoint import CheckpointKind
 
-CHECKPOINT = CheckpointKind("decision", 2, held="fitted decision", remedy="fit it again")
+CHECKPOINT = CheckpointKind("decision", 3, held="fitted decision", remedy="fit it again")
 SHIPPED = Path(__file__).parent / "fitted"
 """Folder of the checkpoint that is part of the package."""
 DAMAGED = (KeyError, TypeError, ValueError, RuntimeError, SafetensorError)

@@ -5,7 +5,7 @@ sub-tasks nor the order of the pool changes the result, not even in the last bit
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,12 @@ class Observed:
     """D step lists."""
     reliability: tuple[Array, ...] | None = None
     """Per demonstration (q,): mean probability that the segmenter gives the label of each segment,
-    in [0, 1]; None where segments were given, not inferred."""
+    in [0, 1]; None where it gives none."""
     ineffective: tuple[Array, ...] | None = None
     """Per demonstration (q,): surprise at how little each segment changed [nats]; None where videos
     were not examined."""
+    told: bool = False
+    """Whether the segments are logged or annotated ones: hardly any step is lost or invented."""
 
     def chosen(self, rows: Sequence[int] | NDArray[np.int64]) -> "Observed":
         """Return the demonstrations of some rows."""
@@ -33,6 +35,7 @@ class Observed:
             tuple(self.steps[row] for row in rows),
             None if self.reliability is None else tuple(self.reliability[row] for row in rows),
             None if self.ineffective is None else tuple(self.ineffective[row] for row in rows),
+            self.told,
         )
 
 
@@ -76,7 +79,7 @@ def canonical(pool: Observed) -> Canonical:
         StepList(tuple(colours[label] for label in demo.labels), demo.lengths)
         for demo in pool.steps
     ]
-    renamed = Observed(tuple(steps), pool.reliability, pool.ineffective).chosen(rows)
+    renamed = replace(pool, steps=tuple(steps)).chosen(rows)
     return Canonical(renamed, rows, np.array(kinds)[rows])
 
 

@@ -24,6 +24,7 @@ def other_evidence(pool: Observed) -> tuple[dict[str, Array], dict[str, Array]]:
         nats = np.array([largest(known[None], 2)[0] for known in pool.ineffective])
         worst, second = nats.T
     columns = {
+        "told": nothing + pool.told,
         "reliability.absent": nothing + (pool.reliability is None),
         "reliability.unsure": unsure,
         "reliability.least": least,

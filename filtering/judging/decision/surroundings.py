@@ -1,7 +1,10 @@
 """Each demonstration beside the rest of its pool, and the pool as a whole."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from filtering.judging.decision.columns import largest
 from filtering.judging.decision.observed import Observed
 from filtering.judging.norm.mixture import Populations
 from filtering.judging.norm.norm_score import NormScore
@@ -12,32 +15,83 @@ ABSENT = 9.0
 """Distance to the next higher one for the highest demonstration [nats]."""
 
 
-def distances(counts: StepCounts, pool: Observed) -> tuple[Array, Array]:
-    """Return (D, D) how different two are in steps and order, and (D, D) 1 for equal lists."""
+@dataclass(frozen=True)
+class Likeness:
+    """What two of D demonstrations have in common."""
+
+    near: Array
+    """(D, D) how different they are in steps and order."""
+    lists: Array
+    """(D, D) 1 where both do the same steps in the same order, as often."""
+    steps: Array
+    """(D, D) 1 where both do the same steps."""
+    order: Array
+    """(D, D) 1 where no two steps are in one order in one and in the other order in the other; 0
+    where steps are done in turns."""
+
+
+def likeness(counts: StepCounts, pool: Observed) -> Likeness:
+    """Compare every two demonstrations of a pool."""
     first, second = np.triu_indices(counts.n_subtasks, 1)
     known, before = counts.both[:, first, second], counts.before[:, first, second]
     crossed = (before * known) @ ((1 - before) * known).T
-    order = (crossed + crossed.T) / np.maximum(known @ known.T, 1)
+    crossed = crossed + crossed.T
     x = counts.occurs
     lacking = x @ (1 - x).T
+    lacking = lacking + lacking.T
     number = x.sum(axis=1)
-    steps = (lacking + lacking.T) / np.maximum(number[:, None] + number[None], 1)
+    away = crossed / np.maximum(known @ known.T, 1)
+    away += lacking / np.maximum(number[:, None] + number[None], 1)
     lists: dict[tuple[int, ...], int] = {}
     kinds = np.array([lists.setdefault(demo.labels, len(lists)) for demo in pool.steps])
-    return order + steps, (kinds[:, None] == kinds[None]).astype(np.float64)
+    return Likeness(
+        near=away,
+        lists=(kinds[:, None] == kinds[None]).astype(np.float64),
+        steps=(lacking == 0).astype(np.float64),
+        order=(crossed == 0).astype(np.float64),
+    )
 
 
-def neighbours(near: Array, same: Array, trust: Array) -> dict[str, Array]:
-    """Describe how near the most similar demonstrations are, and how many do just the same."""
+def neighbours(alike: Likeness, trust: Array) -> dict[str, Array]:
+    """Describe how near the most similar demonstrations are, and those that are all alike."""
     demos = len(trust)
-    ordered = np.sort(near + ABSENT * np.eye(demos), axis=1)
-    return {
+    ordered = np.sort(alike.near + ABSENT * np.eye(demos), axis=1)
+    kept = alike.order.mean(axis=1)
+    pool = {"most": kept.max(), "median": np.median(kept), "least": kept.min()}
+    nearest = {
         "near.1": ordered[:, 0],
         "near.2": ordered[:, min(1, demos - 2)],
         "near.quarter": ordered[:, min(demos - 2, max(1, demos // 4))],
-        "same": (same - np.eye(demos)) @ trust,
-        "plain.same": (same.sum(axis=1) - 1) / (demos - 1),
+        "same": (alike.lists - np.eye(demos)) @ trust,
+        "kept": kept,
     }
+    nearest |= {f"kept: {what}": np.full(demos, value) for what, value in pool.items()}
+    return nearest | camps("lists", alike.lists) | camps("steps", alike.steps)
+
+
+def camps(name: str, alike: Array) -> dict[str, Array]:
+    """Describe groups of demonstrations that are all alike.
+
+    Args:
+        name: in what they are alike.
+        alike: (D, D) 1 where two are; if a and b are, and b and c, so are a and c.
+    """
+    demos = len(alike)
+    sizes, first = alike.sum(axis=1), alike.argmax(axis=1)
+    every = sizes[np.unique(first)]
+    most = largest(every[None], 3)[0] / demos
+    columns = {
+        "own": sizes / demos,
+        "larger": (every[None] > sizes[:, None]).sum(axis=1),
+        "lead": sizes / demos - most[0],
+    }
+    pool = {
+        **dict(zip(("largest", "second", "third"), most, strict=True)),
+        "others": 1 - most.sum(),
+        "number": len(every) / demos,
+    }
+    columns |= {what: np.full(demos, value) for what, value in pool.items()}
+    return {f"{name}: {what}": number for what, number in columns.items()}
 
 
 def context(name: str, values: Array) -> dict[str, Array]:
@@ -60,7 +114,7 @@ def context(name: str, values: Array) -> dict[str, Array]:
 
 
 def whole(
-    counts: StepCounts, near: Array, same: Array, score: NormScore, populations: Populations
+    counts: StepCounts, near: Array, score: NormScore, populations: Populations
 ) -> dict[str, float]:
     """Describe the pool as a whole."""
     demos, share, trust = len(near), counts.occurs.mean(axis=0), score.trust
@@ -68,7 +122,6 @@ def whole(
     p = ((counts.before * counts.both).sum(axis=0) / np.maximum(both, 1))[both > 1]
     bend = np.minimum(p, 1 - p)
     often = share >= 0.5
-    kinds = same.argmax(axis=1)
     weights = trust / trust.sum()
     return {
         "pool.demonstrations": np.log(demos),
@@ -80,8 +133,6 @@ def whole(
         "pool.always": (share >= 1).sum() / max(often.sum(), 1),
         "pool.omitted": ((1 - share) * often).sum(),
         "pool.rare": (share * ~often).sum(),
-        "pool.kinds": len(np.unique(kinds)) / demos,
-        "pool.commonest": same.sum(axis=1).max() / demos,
         "pool.distance": near.sum() / (demos * (demos - 1)),
         "pool.trusted": trust.mean(),
         "pool.trusted distance": float(weights @ near @ weights),

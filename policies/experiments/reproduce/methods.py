@@ -84,7 +84,7 @@ def from_videos(fitted: DemoFilter) -> Answer:
 
 def norm(question: Question) -> Answer:
     """Judge by the score norm and the cut between clusters of its losses."""
-    found = by_norm(question.evidence, JudgingConfig())
+    found = by_norm(question.evidence, JudgingConfig(decision="clusters"))
     losses = found.losses
     return Answer(found.grouping.flagged, losses, probability_incorrect(losses))
 

@@ -41,6 +41,7 @@ class Reading:
             states=reduce_features([self.features[place] for place in places]),
             ineffective=effect_surprises([self.changes[place] for place in places], known.labels),
             reliability=reliability and [reliability[place] for place in places],
+            told=found.told,
         )
 
 

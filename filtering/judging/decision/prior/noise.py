@@ -1,4 +1,4 @@
-"""From what was done to what a segmenter reports: durations, errors, reliability, effects."""
+"""From what was done to what a segmenter reports: durations, errors, reliability."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,13 @@ from filtering.judging.norm.steps import StepList
 from teasim.common.arrays import Array
 
 NOISELESS = 0.5
-"""Share of the pools whose segments are right."""
+"""Share of the pools whose segments are right, but for SLIPS."""
+TOLD = 0.5
+"""Share of those whose segments are known to be told by people or the environment."""
+SLIPS = 0.15
+"""Share of the told pools in which whoever labelled them errs now and then."""
+LEAST_SLIP, LARGEST_SLIP = 0.002, 0.01
+"""Range of the mean rate of each kind of such an error per step, drawn log-uniformly."""
 LEAST_RATE, LARGEST_RATE = 0.02, 0.16
 """Range of the mean rate of each kind of error per step, drawn log-uniformly: segments are either
 right or visibly not."""
@@ -30,7 +36,7 @@ class Noise:
     """How a segmenter errs in a pool."""
 
     rate: float
-    """Mean rate of errors per step and kind; 0 for given segments."""
+    """Mean rate of errors per step and kind; 0 where all segments are right."""
     mix: Array
     """(5,) relative rate of steps lost, confused, confused in part, invented, and split."""
     weak: Array
@@ -47,6 +53,8 @@ class Noise:
     """Probability that two neighbouring steps are done in turns."""
     trust: float
     """Mean reliability of a right segment; 0 where the pool has no reliability."""
+    told: bool = False
+    """Whether the segments are known not to be a segmenter's."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +71,10 @@ class Report:
 
 def draw_noise(rng: np.random.Generator, n_labels: int, *, exact: bool) -> Noise:
     """Draw the noise of a pool of `n_labels` labels, foreign ones included."""
-    log_rate = rng.uniform(np.log(LEAST_RATE), np.log(LARGEST_RATE))
-    noisy = rng.random() > NOISELESS
-    alone = rng.random() < 0.5  # without posteriors
+    told, rate = _draw_rate(rng)
+    alone = told or rng.random() < 0.5  # without posteriors
     return Noise(
-        rate=float(np.exp(log_rate)) if noisy else 0.0,
+        rate=rate,
         mix=rng.dirichlet(np.full(5, 0.8)) * 5 * np.array([1.0, 0.25, 0.6, 1.6, 0.8]),
         weak=rng.gamma(1.0, 1.0, n_labels) if rng.random() < 0.7 else np.ones(n_labels),
         alike=_alike(rng, n_labels),
@@ -76,7 +83,18 @@ def draw_noise(rng: np.random.Generator, n_labels: int, *, exact: bool) -> Noise
         spread=float(rng.choice([0.02, 0.2, 0.35, 0.6], p=[0.1, 0.25, 0.4, 0.25])),
         loop=0.0 if exact or rng.random() > 0.2 else float(rng.uniform(0.005, 0.12)),
         trust=0.0 if alone else float(rng.uniform(0.75, 0.99)),
+        told=told,
     )
+
+
+def _draw_rate(rng: np.random.Generator) -> tuple[bool, float]:
+    """Return whether the segments are told, and the mean rate of errors per step and kind."""
+    right = rng.random() < NOISELESS
+    told = bool(right and rng.random() < TOLD)
+    if right and not (told and rng.random() < SLIPS):
+        return told, 0.0
+    range_ = (LEAST_SLIP, LARGEST_SLIP) if told else (LEAST_RATE, LARGEST_RATE)
+    return told, float(np.exp(rng.uniform(*np.log(range_))))
 
 
 def _alike(rng: np.random.Generator, n_labels: int) -> NDArray[np.int64]:
@@ -208,10 +226,3 @@ def reliabilities(rng: np.random.Generator, noise: Noise, right: NDArray[np.bool
     """Draw how sure the segmenter is of each segment, (q,), for segments that are right or not."""
     sure = np.where(right, noise.trust, 0.6 * noise.trust + 0.1)
     return np.asarray(rng.beta(8 * sure, 8 * (1 - sure)))
-
-
-def surprises(rng: np.random.Generator, ineffective: NDArray[np.bool_]) -> Array:
-    """Draw the surprise at how little each segment changed, (q,) [nats]."""
-    chance = rng.random(len(ineffective))
-    usual = rng.exponential(np.where(chance < 0.02, 2.0, 0.4)) * (chance < 0.4)
-    return np.asarray(np.where(ineffective, rng.gamma(4.0, 1.5, len(ineffective)), usual))

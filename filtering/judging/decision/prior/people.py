@@ -12,7 +12,11 @@ STYLES = ("script", "orders", "close", "varied", "free")
 """How alike correct demonstrations are: one order, an order per person, and around a habit."""
 STYLE_SHARES = (0.26, 0.19, 0.17, 0.22, 0.16)
 """How often pools have each of STYLES."""
-EFFECTS = 0.25
+CLEAN = (0.18, 0.4, 0.18, 0.12, 0.12)
+"""Share of the pools of each of STYLES in which nothing is incorrect: people who vary much err more
+often. This and other shares of the prior were set by hand, with the data sets of
+`scripts/check_decision.py` in sight; see docs/decision.md."""
+EFFECTS = 0.35
 """Share of the pools whose videos are examined for effects."""
 
 
@@ -32,6 +36,11 @@ class People:
     """Whether the videos are examined for effects."""
     ineffective: float
     """Probability that an incorrect demonstration does all steps, one without effect."""
+
+    @property
+    def clean(self) -> float:
+        """Probability that nothing is incorrect."""
+        return CLEAN[STYLES.index(self.style)]
 
     def order(self, rng: np.random.Generator) -> list[int]:
         """Draw a correct order of nodes."""

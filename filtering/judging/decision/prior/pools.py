@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.judging.decision.observed import Observed
+from filtering.judging.decision.prior.effects import Sight, draw_sight, surprises
 from filtering.judging.decision.prior.mistakes import SHARES, make_mistakes
 from filtering.judging.decision.prior.noise import (
     Noise,
@@ -25,7 +26,6 @@ from filtering.judging.decision.prior.noise import (
     draw_noise,
     reliabilities,
     report,
-    surprises,
 )
 from filtering.judging.decision.prior.people import People, draw_people
 from filtering.judging.decision.prior.recipes import draw_recipe
@@ -34,9 +34,6 @@ from teasim.common.arrays import Array
 
 FEWEST_DEMOS, MOST_DEMOS = 4, 60
 """Range of the number of demonstrations, drawn log-uniformly."""
-CLEAN = 0.22
-"""Share of the pools in which nothing is incorrect. This and other shares of the prior were set by
-hand, with the data sets of `scripts/check_decision.py` in sight; see docs/decision.md."""
 FEW_ORDERS = 0.9
 """Share of the pools drawn anew because their correct demonstrations, although free to vary, show
 two or three orders only: people vary in many ways or not at all."""
@@ -78,16 +75,16 @@ def draw_pool(
     Args:
         rng: source of randomness.
         n_demos: D; drawn by default.
-        clean: whether nothing is incorrect; by default a share CLEAN of the pools is.
+        clean: whether nothing is incorrect; by default a share of the pools is, see `People`.
     """
     size = rng.uniform(np.log(FEWEST_DEMOS), np.log(MOST_DEMOS))
     n_demos = n_demos or round(np.exp(size))
-    clean = bool(rng.random() < CLEAN) if clean is None else clean
     while True:
         people = draw_people(rng)
-        groups = [] if clean else draw_groups(rng, n_demos, people.style)
+        nothing = rng.random() < people.clean if clean is None else clean
+        groups = [] if nothing else draw_groups(rng, n_demos, people.style)
         orders, truth = _draw_orders(rng, people, groups, n_demos)
-        if not _ambiguous(rng, people.style, orders, truth != CORRECT):
+        if not _ambiguous(rng, people, orders, truth != CORRECT):
             return _observe(rng, people, orders, truth)
 
 
@@ -142,11 +139,12 @@ def _draw_orders(
 
 
 def _ambiguous(
-    rng: np.random.Generator, style: str, orders: list[list[int]], incorrect: NDArray[np.bool_]
+    rng: np.random.Generator, people: People, orders: list[list[int]], incorrect: NDArray[np.bool_]
 ) -> bool:
     """Whether honest variety looks like a minority, which is left out of the prior."""
-    largest, kinds = _largest_way(orders, incorrect)
+    largest, kinds = _largest_way(people.task, orders, incorrect)
     honest = int((~incorrect).sum())
+    style = people.style
     if style == "script":
         return False
     if style == "orders":
@@ -154,12 +152,18 @@ def _ambiguous(
     return 1 < kinds <= min(3, honest // 3) and rng.random() < FEW_ORDERS
 
 
-def _largest_way(orders: list[list[int]], incorrect: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return how many correct demonstrations share one order at most, and how many orders."""
+def _largest_way(
+    task: Task, orders: list[list[int]], incorrect: NDArray[np.bool_]
+) -> tuple[int, int]:
+    """Return how many correct demonstrations share one order at most, and how many orders.
+
+    Optional steps do not count: who leaves one out does not do the others in another order.
+    """
     counts: dict[tuple[int, ...], int] = {}
     for order, wrong in zip(orders, incorrect, strict=True):
         if not wrong:
-            counts[tuple(order)] = counts.get(tuple(order), 0) + 1
+            must = tuple(node for node in order if task.chance[node] == 1)
+            counts[must] = counts.get(must, 0) + 1
     return max(counts.values(), default=0), len(counts)
 
 
@@ -172,14 +176,15 @@ def _observe(
     effects = reliability = None
     if people.effects:
         useless = truth == INEFFECTIVE
-        effects = tuple(map(partial(_effects, rng), reports, useless))
+        effects = tuple(map(partial(_effects, rng, draw_sight(rng)), reports, useless))
     if noise.trust > 0:
         reliability = tuple(reliabilities(rng, noise, found.right) for found in reports)
-    pool = Observed(tuple(found.steps for found in reports), reliability, effects)
+    steps = tuple(found.steps for found in reports)
+    pool = Observed(steps, reliability, effects, noise.told)
     errors = sum(found.errors for found in reports) / sum(map(len, orders))
     incorrect = truth != CORRECT
     honest = int((~incorrect).sum())
-    largest, _ = _largest_way(orders, incorrect)
+    largest, _ = _largest_way(people.task, orders, incorrect)
     facts = [not incorrect.any(), errors >= NOISY, honest < len(orders) / 2, largest <= honest / 2]
     shuffled = rng.permutation(len(orders))
     return DrawnPool(pool.chosen(shuffled), incorrect[shuffled], np.array(facts))
@@ -193,9 +198,9 @@ def _report(rng: np.random.Generator, task: Task, noise: Noise, order: list[int]
     return report(rng, task, noise, labels.tolist(), usual)
 
 
-def _effects(rng: np.random.Generator, found: Report, useless: bool) -> Array:
+def _effects(rng: np.random.Generator, sight: Sight, found: Report, useless: bool) -> Array:
     """Draw the effects of one demonstration, of which one step may be ineffective."""
     ineffective = np.zeros(len(found.steps.labels), bool)
     if useless:
         ineffective[int(rng.integers(len(ineffective)))] = True
-    return surprises(rng, ineffective)
+    return surprises(rng, sight, ineffective)

@@ -5,7 +5,7 @@ after the dressing is removed.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -101,19 +101,20 @@ def judge_salads(unit: Unit, store: Store, workers: Workers) -> Result:
     for number, pool in enumerate(draw_salads(salads, spec["k"], spec["pools"], spec["row"])):
         kinds = np.array([int(salad.dressing_first) for salad in pool])
         names = tuple(salad.name for salad in pool)
-        judged.append(judge_all(Question(_evidence(folder, pool), kinds, names, seed=number)))
+        known = _evidence(folder, pool, told=spec["steps"] == TRUE)
+        judged.append(judge_all(Question(known, kinds, names, seed=number)))
     return {"pools": judged}
 
 
-def _evidence(folder: MSTCNFolder, pool: Sequence[Salad]) -> Evidence:
+def _evidence(folder: MSTCNFolder, pool: Sequence[Salad], *, told: bool) -> Evidence:
     """Return the evidence of step lists; the state of equation 3 is the current step."""
     spans = tuple(
         tuple(Span(folder.names[run.label], run.start, run.stop) for run in runs(salad.labels))
         for salad in pool
     )
-    known = Evidence(folder.names, spans)
+    known = Evidence(folder.names, spans, told=told)
     states = [np.eye(len(folder.names))[labels] for labels in known.labels]
-    return Evidence(folder.names, spans, states=states)
+    return replace(known, states=states)
 
 
 def units(plan: Plan) -> list[Unit]:
