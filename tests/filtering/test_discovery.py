@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from filtering.segmentation.unlabelled import discovery
 from filtering.segmentation.unlabelled.discovery import (
     MOST_STAGES,
     MOST_SUBTASKS,
@@ -11,6 +12,7 @@ from filtering.segmentation.unlabelled.discovery import (
     stage_count,
 )
 from filtering.segmentation.unlabelled.twfinch import partition
+from teasim.common.workers import Workers
 from teasim.pool.types import runs
 
 FEATURES = 16
@@ -87,6 +89,15 @@ def test_permuting_the_videos_permutes_the_result(four):
     for place, number in enumerate(order):
         np.testing.assert_array_equal(permuted.labels[place], found.labels[number])
         np.testing.assert_allclose(permuted.posteriors[place], found.posteriors[number], atol=1e-6)
+
+
+def test_the_result_does_not_depend_on_the_number_of_workers(four, monkeypatch):
+    monkeypatch.setattr(discovery, "WORTH_WORKERS", 1)
+    videos, _, found = four
+    for jobs in (2, 3):
+        again = discover(videos, workers=Workers(jobs))
+        for one, other in zip(found.posteriors, again.posteriors, strict=True):
+            np.testing.assert_array_equal(one, other)
 
 
 def test_more_noise_makes_less_sure(four):

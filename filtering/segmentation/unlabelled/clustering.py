@@ -65,7 +65,7 @@ def clustering(
             f"'{pool.root}' gives only {longest} frames to compare; choose fewer."
         )
     with threadpool_limits(limits=1, user_api="blas"):  # sums get one order
-        found = discover(videos, subtasks)
+        found = discover(videos, subtasks, workers=workers)
     names = tuple(f"step {number + 1}" for number in range(found.posteriors[0].shape[1]))
     spans, posteriors = {}, {}
     for place, number in enumerate(order):

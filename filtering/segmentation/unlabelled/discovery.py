@@ -9,9 +9,11 @@ sub-tasks minimises log(unexplained variance) + SMALLEST_GAIN * T.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from filtering.segmentation.unlabelled.stage_model import (
     NOWHERE,
@@ -23,7 +25,9 @@ from filtering.segmentation.unlabelled.stage_model import (
     probabilities,
 )
 from filtering.segmentation.unlabelled.twfinch import partition
+from teasim.common import parallel
 from teasim.common.arrays import Array
+from teasim.common.workers import IN_PROCESS, Workers
 from teasim.pool.types import runs
 
 MOST_SUBTASKS = 12
@@ -41,6 +45,9 @@ SPARE_PARTS = (0, 2)
 """Parts into which a video is cut beyond T; the T longest parts make a start."""
 ROUNDS = 12
 """Largest number of iterations of a refinement."""
+WORTH_WORKERS = 3000
+"""Moments of a pool from which numbers of sub-tasks are tried in several processes; with fewer it
+takes longer to start them."""
 TINY = 1e-12
 """Variance added before the logarithm, for videos without change [variance of a feature]."""
 
@@ -76,17 +83,23 @@ class _Fit:
         return float(np.log(variance + TINY) + SMALLEST_GAIN * T)
 
 
-def discover(videos: Sequence[Array], subtasks: int | None = None) -> Discovery:
+def discover(
+    videos: Sequence[Array], subtasks: int | None = None, *, workers: Workers = IN_PROCESS
+) -> Discovery:
     """Find the sub-tasks of a pool.
 
     Args:
         videos: per video (n, F) features, each feature's mean over the video taken out.
         subtasks: their number; None infers it. Sub-tasks that no video shows are dropped.
+        workers: where numbers of sub-tasks are tried; the result does not depend on it.
     """
     stages = stage_count([len(video) for video in videos], subtasks)
     kept = [_stretched(len(video), stages) for video in videos]
     stacked = Videos.of([video[rows] for video, rows in zip(videos, kept, strict=True)])
-    fit = _best_fit(stacked, subtasks, stages) if subtasks else _best_number(stacked, stages)
+    if subtasks:
+        fit = _best_fit(stacked, stages, subtasks)
+    else:
+        fit = _best_number(stacked, stages, workers)
     order = _usual_order(fit.states // stages, stacked.lengths)
     rank = np.full(len(fit.model.means), len(order))
     rank[order] = np.arange(len(order))
@@ -120,22 +133,32 @@ def _stretched(length: int, least: int) -> NDArray[np.int64]:
     return np.arange(length) if length >= least else np.arange(least) * length // least
 
 
-def _best_number(videos: Videos, stages: int) -> _Fit:
+def _best_number(videos: Videos, stages: int, workers: Workers) -> _Fit:
     """Return the fit of least cost over the numbers of sub-tasks 1, 2, ..."""
-    best = _best_fit(videos, 1, stages)
-    for subtasks in range(2, most_subtasks(videos.lengths, stages) + 1):
-        fit = _best_fit(videos, subtasks, stages)
+    best = _best_fit(videos, stages, 1)
+    for subtasks, fit in _fits(videos, stages, workers):
         best = min(best, fit, key=_Fit.cost)
         if subtasks - len(best.model.means) >= PATIENCE:
             break
     return best
 
 
-def _best_fit(videos: Videos, subtasks: int, stages: int) -> _Fit:
+def _fits(videos: Videos, stages: int, workers: Workers) -> Iterator[tuple[int, _Fit]]:
+    """Yield the best fits of 2, 3, ... sub-tasks; every worker tries one number at a time."""
+    used = workers if videos.lengths.sum() >= WORTH_WORKERS else IN_PROCESS
+    trial = partial(_best_fit, videos, stages)
+    numbers = range(2, most_subtasks(videos.lengths, stages) + 1)
+    for first in range(0, len(numbers), used.count):
+        some = numbers[first : first + used.count]
+        yield from zip(some, parallel.run(trial, some, workers=used, progress=False), strict=True)
+
+
+def _best_fit(videos: Videos, stages: int, subtasks: int) -> _Fit:
     """Refine the best starts and return the fit of least error."""
-    starts = [_fit(videos, model) for model in _starts(videos, subtasks, stages)]
-    starts.sort(key=lambda fit: fit.error)
-    return min((_refined(videos, fit) for fit in starts[:STARTS]), key=lambda fit: fit.error)
+    with threadpool_limits(limits=1, user_api="blas"):  # sums get one order in every process
+        starts = [_fit(videos, model) for model in _starts(videos, subtasks, stages)]
+        starts.sort(key=lambda fit: fit.error)
+        return min((_refined(videos, fit) for fit in starts[:STARTS]), key=lambda fit: fit.error)
 
 
 def _starts(videos: Videos, subtasks: int, stages: int) -> Iterator[StageModel]:
