@@ -51,7 +51,9 @@ NOT_THE_SAME = (
     "clustering finds are judged instead."
 )
 """Note on a pool whose segmenter is not confirmed by the counterparts of moments."""
-COST_UNUSED = "The cost of a miss was not used, because clusters decided, not the learned decision."
+COST_UNUSED = (
+    "The cost of a miss was not used: it is for the learned decision, which did not judge."
+)
 """Note on a cost that was given in vain."""
 ABOUT_PICTURES = ("cameras", "frames_per_segment", "background", "features", "backbone")
 """Settings that need pictures."""

@@ -100,6 +100,25 @@ def test_the_result_does_not_depend_on_the_number_of_workers(four, monkeypatch):
             np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.parametrize(("least", "together"), [(1, 3), (10**9, 1)])
+def test_large_pools_try_as_many_numbers_at_once_as_there_are_workers(
+    four, monkeypatch, least, together
+):
+    tried = []
+
+    def run(function, items, *, workers, progress):
+        tried.append((list(items), workers.count))
+        return [function(item) for item in items]
+
+    monkeypatch.setattr(discovery, "WORTH_WORKERS", least)
+    monkeypatch.setattr(discovery.parallel, "run", run)
+    discover(four[0], workers=Workers(3))
+    numbers = [number for items, _ in tried for number in items]
+    assert numbers == list(range(2, 2 + len(numbers)))
+    assert {count for _, count in tried} == {together}
+    assert max(len(items) for items, _ in tried) == together
+
+
 def test_more_noise_makes_less_sure(four):
     noisy = discover(made_up(ORDERS, noise=8.0)[0], 4)
     sure, unsure = (

@@ -141,6 +141,7 @@ def test_those_who_break_a_rule_do_not_say_what_is_usual() -> None:
     assert flagged(found) == list(range(8))
     alone = judged([USUAL] * 4, decision="learned")
     assert found.probabilities[8:] == pytest.approx(alone.probabilities)
+    assert found.decision.facts == pytest.approx(alone.decision.facts)
     few = judged([SHORT] * 8 + [USUAL] * 2, decision="learned", critical=("add_water",))
     assert flagged(few)[:8] == list(range(8))
 
