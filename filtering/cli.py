@@ -41,7 +41,7 @@ class FilterCommand:
     the local cache), a robomimic file, a Minari data set, a folder of ALOHA episodes or of videos,
     or an MS-TCN folder (one label per frame, without videos)."""
     out: Out
-    """Folder for weights.csv, filter.json, keep.txt, exclude.txt and report.html."""
+    """Folder for weights.csv, segments.csv, filter.json, keep.txt, exclude.txt and report.html."""
     config: Annotated[FilterConfig, tyro.conf.OmitArgPrefixes]
     """Settings of the filter."""
     options: Annotated[ReadOptions, tyro.conf.OmitArgPrefixes]

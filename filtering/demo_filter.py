@@ -476,11 +476,9 @@ from the whole video.
         warning = caution(len(self.weights_))
         unused = self.config.cost != FilterConfig.cost and self.chosen_.decision != "learned"
         by_steps = self.summary_.words if self.summary_ else ()
-        split = any(words.startswith("No majority") for words in by_steps)
         decided = [
             f"{words[0].upper()}{words[1:]}."
             for words in (self.decision_.words if self.decision_ else ())
-            if not (split and words.startswith("no majority: about half"))  # is said by steps
         ]
         if self.chosen_.score == COMBINED:  # moments may see more than the found sub-tasks
             by_steps = tuple(

@@ -17,8 +17,8 @@ from teasim.common.cli import parse, resumable
 EXAMPLES = {
     "train": (
         "teasim train pool --weights findings/weights.csv -o policy",
-        "teasim train pool --learner bc-rnn --set hidden=128 --observe state -o policy",
-        "teasim train pool --learner ppo --from policy -o improved",
+        "teasim train pool --learner bc --set steps=1000 --observe state -o cloned",
+        "teasim train pool --learner ppo --from cloned -o improved",
     ),
     "evaluate": (
         "teasim evaluate policy --episodes 20 --json scores.json",
@@ -58,6 +58,7 @@ def evaluate(argv: Sequence[str] | None = None) -> int:
     return run_evaluation(settings)
 
 
+@resumable
 def ablate(argv: Sequence[str] | None = None) -> int:
     """Train and score policies over pools x filters x learners x seeds."""
     settings = parse(AblateSettings, argv, verb="ablate", examples=EXAMPLES["ablate"])

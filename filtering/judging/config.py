@@ -44,8 +44,8 @@ class JudgingConfig:
     most of the pool does), combined (the graver verdict of these two) or equation3 (the next-step
     model of the paper). auto: combined for videos alone, or else norm."""
     groups: str = "auto"
-    """Number of groups: auto (kept; also out of order, steps left out and, unless clusters decide,
-    extra steps), 1 (nothing is flagged), 2 or 3."""
+    """Number of groups: auto (kept; also out of order, steps left out, extra steps, which clusters
+    of sub-tasks do not find, and breaks a rule), 1 (nothing is flagged), 2 or 3."""
     threshold: float | str = "auto"
     """Weight below which a demonstration is flagged: a number between 0 and 1, auto (the rule of
     the score), or the mid-points between groups of weights found by kmeans, gmm or minibatch."""

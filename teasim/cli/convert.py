@@ -20,7 +20,7 @@ Format = Literal["lerobot", "lerobot-v2.1", "robomimic", "minari", "videos", "ms
 
 EXAMPLES = (
     "teasim convert demo.hdf5 pool --to lerobot",
-    "teasim convert pool kept.hdf5 --to robomimic --weights findings/weights.csv",
+    "teasim convert pool kept --weights findings/weights.csv --drop-flagged",
 )
 LABEL_EXAMPLES = (
     "teasim label videos --segments f/segments.csv --names n.txt -o named",

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from teasim.common.cli import parse
+from teasim.common.cli import parse, resumable
 from teasim.common.workers import WorkerOptions, Workers
 from teasim.generation.config import GenerateConfig, PoolOptions
 
@@ -34,6 +34,7 @@ class GenerateArguments:
     """Where the work runs."""
 
 
+@resumable
 def main(argv: Sequence[str] | None = None) -> int:
     """Render a pool of tea-making demonstrations, with mistakes in it when asked for."""
     arguments = parse(GenerateArguments, argv, verb="generate", examples=EXAMPLES)

@@ -62,6 +62,25 @@ def test_help_fits_a_terminal_and_ends_with_two_examples(verb):
 
 
 @pytest.mark.parametrize("verb", VERBS)
+def test_the_options_of_examples_exist(verb):
+    examples = run(verb, "--help").stdout.split("examples:\n")[1].splitlines()[:-1]
+    for _, _, *words in map(str.split, examples):
+        part = [word for word in words[:1] if not word.startswith("-")]  # perhaps a sub-command
+        known = run(verb, *part, "--help").stdout.split("examples:")[0]
+        options = {word for word in words if word.startswith("--")}
+        assert options <= set(re.findall(r"--[\w-]+", known)), " ".join(words)
+
+
+def test_verbs_that_go_on_where_they_were_interrupted_say_so_and_are_documented():
+    verbs = {p.name: p.load() for p in entry_points(group=GROUP) if p.name in VERBS}
+    resuming = {name for name, verb in verbs.items() if getattr(verb, "resumes", False)}
+    text = (ROOT / "docs" / "cluster.md").read_text()
+    sentence = re.search(r"`generate`[^.]*resume what was interrupted", text)
+    assert sentence is not None
+    assert resuming == set(re.findall(r"`(\w+)`", sentence[0]))
+
+
+@pytest.mark.parametrize("verb", VERBS)
 def test_options_are_completed_by_the_shell(verb):
     script = run(verb, "--tyro-print-completion", "bash").stdout
     assert f"# Bash completion for teasim {verb}" in script

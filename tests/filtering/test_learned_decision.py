@@ -132,7 +132,6 @@ def test_a_missing_step_is_found_and_a_clean_pool_is_silent() -> None:
 def test_a_large_minority_that_lacks_a_step_is_no_basis() -> None:
     usual = [0, 1, 2, 3, 4, 5, 6]
     found = decide(pool_of([usual] * 6 + [[0, 1, 2, 4, 5, 6]] * 8), 2.0)
-    assert found.split == pytest.approx(6 / 14)
     assert any(words.startswith("no majority: ") for words in found.words)
     assert any("the majority may be wrong" in words for words in found.words)
 

@@ -74,8 +74,6 @@ def test_a_majority_that_omits_a_step_is_never_kept_in_silence(decision, tmp_pat
 
 def test_a_step_that_half_leave_out_is_said_once(tmp_path: Path) -> None:
     found = fitted(tmp_path / "p", [USUAL] * 6 + [NO_WATER] * 6, decision="learned")
-    assert any("no majority: about half" in words for words in found.decision_.words)
-    assert not any("No majority: about half" in words for words in found.words_)
     assert sum("leave" in words and "No majority" in words for words in found.words_) == 1
 
 

@@ -214,12 +214,14 @@ def test_unknown_names_are_answered_with_the_choices(toy_pool: Pool) -> None:
         (Path.absolute, "There is no pool at '{root}': the folder does not exist."),
         (
             lambda root: root.write_text("x"),
-            "There is no pool at '{root}': it is a file, and a pool is a folder.",
+            "There is no pool at '{root}': it is a file, and a pool is a folder; `teasim "
+            "convert` writes one from other formats.",
         ),
         (lambda root: root.mkdir(), "There is no pool at '{root}': the folder is empty."),
         (
             lambda root: (root / "a" / "b").mkdir(parents=True),
-            "There is no pool at '{root}': a LeRobot data set has the file meta/info.json.",
+            "There is no pool at '{root}': a LeRobot data set has the file meta/info.json; "
+            "`teasim convert` writes one from other formats.",
         ),
         (
             lambda root: (root / ".incomplete" / "episode-000003").mkdir(parents=True),

@@ -27,8 +27,6 @@ LIKELY, because all probabilities are wrong where the majority is."""
 THIN = 0.4
 """Share of flagged demonstrations from which the majority is too thin to rely on: which
 of two parts of like size is the correct one, no pool can tell."""
-HALF = 0.4
-"""Share from which a part counts as about half of a pool."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +41,6 @@ class PoolDecision:
     """False alarms that a miss is worth."""
     sha256: str
     """Hash of the weights of the model."""
-    split: float = 0.0
-    """Largest share, up to one half, that is alone in doing or in leaving out a step."""
 
     @property
     def cut(self) -> float:
@@ -78,11 +74,6 @@ class PoolDecision:
             found.append(
                 "no majority: perhaps more than half of the demonstrations are incorrect in the "
                 "same way; the majority may be wrong"
-            )
-        elif self.split >= HALF:
-            found.append(
-                "no majority: about half of the demonstrations leave out a step that the others "
-                "do; if it is not optional, the majority may be wrong"
             )
         if self.facts["noisy"] >= LIKELY and self.expected_recall < LIKELY:
             found.append(
@@ -127,14 +118,7 @@ def decide(pool: Observed, cost: float, model: DecisionModel | None = None) -> P
     probabilities = np.empty(len(logits))
     probabilities[own.rows] = expit(logits)
     stated = dict(zip(FACTS, expit(facts).tolist(), strict=True))
-    return PoolDecision(probabilities, stated, cost, model.sha256, _split(pool))
-
-
-def _split(pool: Observed) -> float:
-    """Return the largest share, up to one half, that is alone in doing or leaving out a step."""
-    demos = [set(demo.labels) for demo in pool.steps]
-    shares = np.array([np.mean([a in demo for demo in demos]) for a in set().union(*demos)])
-    return float(np.minimum(shares, 1 - shares).max())
+    return PoolDecision(probabilities, stated, cost, model.sha256)
 
 
 def _judge(pool: Observed, model: DecisionModel) -> tuple[Array, Array]:

@@ -34,8 +34,8 @@ LEAST_SPREAD = 0.1
 """Least standard deviation of sqrt(loss) within the lower cluster [sqrt(nats)]. Chosen with
 VARIETY."""
 NATURES = ("kept", "out of order", "steps left out", "extra steps")
-"""Groups of demonstrations, the best first; an ineffective step counts as left out. Only the
-learned decision knows extra steps."""
+"""Groups of demonstrations, the best first; an ineffective step counts as left out. Extra steps are
+known to the learned decision and to moments, not to this cut."""
 
 
 def decide(losses: Array, left_out: NDArray[np.bool_], groups: str) -> tuple[Array, Grouping]:

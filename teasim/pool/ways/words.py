@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from teasim.pool.ways.ways import Way, Ways, inversions
 
 HALF = 0.4
-"""Share from which a part counts as about half of a pool, as in the learned decision."""
+"""Share from which a part counts as about half of a pool."""
 THIRD = 1 / 3
 """Share from which the second of two orders leaves no clear majority to the first."""
 CLEAR = 0.8

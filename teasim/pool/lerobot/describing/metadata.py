@@ -21,6 +21,8 @@ from teasim.pool.lerobot.describing.places import filled, homes_of, inside
 
 FASTEST = 1e6
 """No data set has more frames per second."""
+CONVERT = "`teasim convert` writes one from other formats"
+"""What helps who has another kind of data set."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,9 @@ def require_pool_folder(root: Path) -> None:
     if not root.exists():
         raise PoolError(f"There is no pool at '{root}': the folder does not exist.")
     if not root.is_dir():
-        raise PoolError(f"There is no pool at '{root}': it is a file, and a pool is a folder.")
+        raise PoolError(
+            f"There is no pool at '{root}': it is a file, and a pool is a folder; {CONVERT}."
+        )
     if (root / layout.INFO).is_file():
         return
     if (root / layout.STAGING).is_dir():
@@ -180,7 +184,9 @@ def require_pool_folder(root: Path) -> None:
         )
     if not any(root.iterdir()):
         raise PoolError(f"There is no pool at '{root}': the folder is empty.")
-    raise PoolError(f"There is no pool at '{root}': a LeRobot data set has the file {layout.INFO}.")
+    raise PoolError(
+        f"There is no pool at '{root}': a LeRobot data set has the file {layout.INFO}; {CONVERT}."
+    )
 
 
 def _read_info(root: Path) -> Mapping[str, Any]:
