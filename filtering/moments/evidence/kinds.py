@@ -12,13 +12,14 @@ Order counts only where the counterpart of the counterpart is the moment itself,
 that recurs, such as rests; what recurs in both videos is neither missing nor extra, see
 `counterparts`. What a share VARIETY of the videos does, an optional step left out or another legal
 order, is thus never evidence; nor is what is usual among the demonstrations of the same look, see
-`peers`. Each curve is summed up by the mean of its largest twelfth over t, because a step is a part
-of a video; missing and order by the median over the trusted references of the same look, because a
-reference may be incorrect too; extra by the quantile SHARED over all of them, so that trust does
-not change it. Extra is also found from plain nearest moments in place of counterparts, and the
-larger value counts: a step done twice is seen in contested places alone, and one that nobody else
-does better in plain ones. Missing and extra count less the more of the stretch is replaced, see
-`replaced`.
+`peers`. A curve of order is summed up by the mean of its largest twelfth over t, because a step is
+a part of a video; one of missing or extra moments by that of its largest second, because much of a
+step looks like other steps. Missing and order take the median over the trusted references of the
+same look, because a reference may be incorrect too; extra takes the quantile SHARED over all of
+them, so that trust does not change it. Extra is also found from plain nearest moments in place of
+counterparts, and the larger value counts: a step done twice is seen in contested places alone, and
+one that nobody else does better in plain ones. Missing and extra count less the more of the stretch
+is replaced, see `replaced`.
 """
 
 from collections.abc import Sequence
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 
 from filtering.moments.evidence.replaced import Side, replaced
 from filtering.moments.evidence.strange import Strange
-from filtering.moments.evidence.stretches import Evidence, Stretch, less, peak, worst
+from filtering.moments.evidence.stretches import Evidence, Stretch, brief, less, peak, worst
 from filtering.moments.evidence.usual import FEWEST, Reference
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ class _Comparison:
         filled = self._strange.curves[0]
         lacks = [self._lacks[reference.number] for reference in self._trusted]
         values = [
-            less(worst(lack), replaced(Side(lack, r.at(self._d)), filled, *peak(lack)))
+            less(brief(lack), replaced(Side(lack, r.at(self._d)), filled, *peak(lack)))
             for r, lack in zip(self._trusted, lacks, strict=True)
         ]
         return self._middle(values, lacks)
@@ -95,7 +96,7 @@ class _Comparison:
             replaced(Side(curve, side.at), lack, start, stop)
             for side, lack in zip(sides, self._lacks.values(), strict=True)
         ]
-        value = less(worst(curve), float(np.median(shares)))
+        value = less(brief(curve), float(np.median(shares)))
         nearest = int(np.argmin([side.curve[start:stop].mean() for side in sides]))
         places = sides[nearest].at[start:stop]
         other = Stretch(self._references[nearest].number, int(places.min()), int(places.max()) + 1)

@@ -18,7 +18,7 @@ from filtering.moments.decision import KINDS, Observed, exceedances, judge
 from filtering.moments.evidence.effects import states_of, usual_change
 from filtering.moments.evidence.orders import variety_of
 from filtering.moments.evidence.replaced import Side, replaced
-from filtering.moments.evidence.stretches import peak, worst
+from filtering.moments.evidence.stretches import BRIEF, brief, peak, worst
 from filtering.moments.evidence.usual import moved, usual_of, usual_of_others
 from filtering.moments.score import score_moments
 from filtering.moments.suitable import comparable
@@ -370,6 +370,16 @@ def test_the_worst_twelfth_counts():
     start, stop = peak(curve)
     assert start <= 20
     assert stop >= 24
+
+
+@pytest.mark.parametrize("length", [48, 480])
+def test_a_strange_second_counts_alike_in_short_and_long_videos(length):
+    curve = np.zeros(length)
+    curve[20 : 20 + BRIEF] = 1.0
+    assert brief(curve) == 1.0
+    curve[20] = 0.0
+    assert brief(curve) == pytest.approx(1 - 1 / BRIEF)
+    assert brief(np.array([1.0, 3.0])) == 2.0
 
 
 def test_what_a_share_of_the_others_reaches_is_usual():
