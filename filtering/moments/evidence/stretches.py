@@ -10,10 +10,9 @@ Array = NDArray[np.float64]
 WORST = 12
 """The worst 1 / WORST of a video counts."""
 BRIEF = 5
-"""Moments of which the strangest ones count: one second. Much of a step looks like other steps,
-however long the video is. Of 3 to 20 moments and of 1/8 to 1/24 of the video, 5 moments find most
-missing and extra steps of the scenes TUNED_ON and of people making tea (found .86 -> .90 and
-.69 -> .76 at as many accused)."""
+"""Number of the strangest moments that count, one second at `score.RATE`: much of a step looks like
+other steps, however long the video is. Chosen with SCALE and SCATTER of these kinds, see
+`moments.decision`; 3 and 8 are about as good, shares of the video are worse."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +41,12 @@ class Evidence:
 
 def worst(curve: NDArray[np.floating]) -> float:
     """Return the mean of the largest twelfth of a curve (n,), of 3 values or more."""
-    count = min(len(curve), max(3, len(curve) // WORST))
-    return float(np.sort(curve)[-count:].mean())
+    return _mean_of_largest(curve, max(3, len(curve) // WORST))
 
 
 def brief(curve: NDArray[np.floating]) -> float:
     """Return the mean of the BRIEF largest values of a curve (n,), of all where it has fewer."""
-    return float(np.sort(curve)[-BRIEF:].mean())
+    return _mean_of_largest(curve, BRIEF)
 
 
 def peak(curve: NDArray[np.floating]) -> tuple[int, int]:
@@ -64,6 +62,11 @@ def peak(curve: NDArray[np.floating]) -> tuple[int, int]:
     start = int(low[low < top].max(initial=-1)) + 1
     stop = int(low[low > top].min(initial=len(curve)))
     return start, stop
+
+
+def _mean_of_largest(curve: NDArray[np.floating], count: int) -> float:
+    """Return the mean of the `count` largest values of a curve, of all where it has fewer."""
+    return float(np.sort(curve)[-count:].mean())
 
 
 def less(value: float, share: float) -> float:

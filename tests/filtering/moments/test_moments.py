@@ -15,6 +15,7 @@ from filtering.moments.counterparts import (
     recurring,
 )
 from filtering.moments.decision import KINDS, Observed, exceedances, judge
+from filtering.moments.evidence import kinds
 from filtering.moments.evidence.effects import states_of, usual_change
 from filtering.moments.evidence.orders import variety_of
 from filtering.moments.evidence.replaced import Side, replaced
@@ -380,6 +381,17 @@ def test_a_strange_second_counts_alike_in_short_and_long_videos(length):
     curve[20] = 0.0
     assert brief(curve) == pytest.approx(1 - 1 / BRIEF)
     assert brief(np.array([1.0, 3.0])) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "order"), [("missing", MISSING), ("extra", [0, 1, 5, 2, 3, 4]), ("order", SWAPPED)]
+)
+def test_missing_and_extra_steps_are_summed_up_by_their_strangest_second(kind, order, monkeypatch):
+    """Where nothing is strange for a second, they are not found; a wrong order still is."""
+    videos = [*usual_videos(7), toy_video(order, 50)]
+    assert judged(videos).exceeded[kind][7] > 1
+    monkeypatch.setattr(kinds, "brief", lambda _: 0.0)
+    assert (judged(videos).exceeded[kind][7] > 1) == (kind == "order")
 
 
 def test_what_a_share_of_the_others_reaches_is_usual():
