@@ -7,10 +7,10 @@ what usually changes here. A video has of it
 
     p_k = max over the neighbourhood of the cell of <x_k, m> / |m| and OTHER_COLOUR |x_k|,
 
-in a neighbourhood because things do not lie exactly where they lay; pictures of a camera that stood
-elsewhere are shifted as a whole before that. What changes into another colour counts for less: a
-hand of another skin or sleeve is not a step without effect. With q the median of p over the trusted
-videos, the share that is not there is
+in a neighbourhood because things do not lie exactly where they lay; pictures in which all changes
+lie elsewhere are shifted as a whole before that, see `viewpoints`. What changes into another colour
+counts for less: a hand of another skin or sleeve is not a step without effect. With q the median of
+p over the trusted videos, the share that is not there is
 
     (q - p_k) / (q + NOISE),
 
@@ -31,29 +31,31 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from filtering.moments.counterparts import Counterparts, how_far
-from filtering.moments.evidence.offsets import offset_between, shifted_back
+from filtering.moments.evidence.changes import (
+    LATER,
+    REACH,
+    Change,
+    States,
+    around,
+    change_about,
+    change_at,
+    lasting_sizes,
+    later_about,
+    place_of,
+    states_of,
+)
 from filtering.moments.evidence.recurring import recurrences
 from filtering.moments.evidence.stretches import Evidence, Stretch
 from filtering.moments.evidence.usual import usual_of_others
+from filtering.moments.evidence.viewpoints import Viewpoint
 from filtering.moments.peers.colours import actors_of
 from filtering.moments.peers.peers import FEWEST, Flags, Looks, Peers
 from filtering.moments.vectors import Video
 
 Array = NDArray[np.float64]
-Change = NDArray[np.float32]
-"""(H, W, 3) what each cell changes by, -255..255."""
 Amounts = NDArray[np.float32]
 """(..., C) how much of a usual change is there, 0..255."""
-States = NDArray[np.float32]
-"""(n, H, W, 3) what lies where, hands and arms taken out."""
 
-REACH = 8
-"""Moments before and after which the picture is compared; those of `windows.REACH`."""
-LATER = 2
-"""How much farther before and after it is looked whether a change lasts [REACH]."""
-LASTING_SHARE = 0.5
-"""Share of a change that must still be there farther on: what an arm covers for a while is no
-effect."""
 DOUBTFUL = 6
 """Moments by which the counterpart of a counterpart may miss where it began, or else nothing is
 said about the change."""
@@ -61,17 +63,8 @@ STRIDE = 2
 """Every second moment is looked at."""
 OBSERVERS = 3
 """References from which is told where to look, the most central ones."""
-BEGINNING = 20
-"""First moments of a video, 4 s, in which little was done yet: by what lies where in their median
-the place of the camera is known."""
-STILL = 2
-"""Moments on each side over which the median is taken."""
-BLUR = 0.7
-"""Standard deviation of the blur [cells]."""
 NEIGHBOURHOOD = 2
 """How far a thing may lie from where it usually does [cells]."""
-LEAST_CHANGE = 12.0
-"""Least usual change of a cell that counts, 0..255."""
 NOISE = 20.0
 """Added to the usual change of a cell: small changes cannot be lacking altogether, 0..255."""
 LEAST_SHARE = 0.1
@@ -188,50 +181,22 @@ def ineffective(found: Counterparts, views: Sequence[View], peers: Peers) -> Evi
 def observe(found: Counterparts, videos: Sequence[Video]) -> Effects:
     """Return what usually changes, and in which videos the same actor brings it about."""
     states = {r: states_of(videos[r]) for r in found.references}
-    places = {row: beginning(states[found.references[row]]) for row in _central(found)}
-    seen = {
-        row: {r: placed_as(place, own) for r, own in states.items()}
-        for row, place in places.items()
-    }
-    usual = {row: _usual_changes(found, row, seen[row]) for row in seen}
-    amounts: dict[int, list[list[Amounts]]] = {row: [] for row in usual}
+    viewpoints = [Viewpoint(found, row, states[found.references[row]]) for row in _central(found)]
+    seen = [{r: one.placed(r, own) for r, own in states.items()} for one in viewpoints]
+    usual = [_usual_changes(found, v.row, s) for v, s in zip(viewpoints, seen, strict=True)]
+    amounts: list[list[list[Amounts]]] = [[] for _ in viewpoints]
     for d, video in enumerate(videos):
         other = None if d in states else states_of(video)
-        for row, changes in usual.items():
-            there = seen[row][d] if other is None else placed_as(places[row], other)
-            amounts[row].append([_amounts(u, there, found, row, d) for u in changes])
+        for place, viewpoint in enumerate(viewpoints):
+            there = seen[place][d] if other is None else viewpoint.placed(d, other)
+            shown = [_amounts(u, there, found, viewpoint.row, d) for u in usual[place]]
+            amounts[place].append(shown)
     views = [
-        View(row, tuple(changes), tuple(map(np.stack, zip(*amounts[row], strict=True))))
-        for row, changes in usual.items()
+        View(viewpoint.row, tuple(changes), tuple(map(np.stack, zip(*shown, strict=True))))
+        for viewpoint, changes, shown in zip(viewpoints, usual, amounts, strict=True)
         if changes
     ]
     return Effects(tuple(views), actors_of(videos))
-
-
-def beginning(states: States) -> Change:
-    """Return (H, W, 3): what lies in each cell before anything is done."""
-    return np.asarray(np.median(states[:BEGINNING], axis=0), dtype=np.float32)
-
-
-def placed_as(place: Change, states: States) -> States:
-    """Return states as they are from the place of the camera that sees the beginning `place`."""
-    return shifted_back(states, offset_between(place, beginning(states)))
-
-
-def states_of(video: Video) -> States:
-    """Return (n, H, W, 3): cells of equal brightness, blurred, medians over a few moments."""
-    import cv2
-
-    blurred = np.stack([cv2.GaussianBlur(image, (0, 0), BLUR) for image in video.lit_alike()])
-    padded = np.pad(blurred, ((STILL, STILL), (0, 0), (0, 0), (0, 0)), mode="edge")
-    shifted = [padded[shift : shift + len(video)] for shift in range(2 * STILL + 1)]
-    return np.median(shifted, axis=0).astype(np.float32)
-
-
-def change_at(states: States, before: int, after: int) -> Change:
-    """Return (H, W, 3): what is there at the moment `after` minus what was there `before`."""
-    last = len(states) - 1
-    return np.asarray(states[min(after, last)] - states[max(before, 0)])
 
 
 def usual_change(moment: int, changes: Change, later: Change) -> Usual | None:
@@ -243,11 +208,9 @@ def usual_change(moment: int, changes: Change, later: Change) -> Usual | None:
         later: (D, H, W, 3) their changes between moments farther before and after.
     """
     median, lasting = np.median(changes, axis=0), np.median(later, axis=0)
-    sizes = np.linalg.norm(median, axis=-1)
-    lasts = (median * lasting).sum(axis=-1) >= LASTING_SHARE * np.square(sizes)
-    sizes = np.where(lasts, sizes, 0.0)
+    sizes = lasting_sizes(median, lasting)
     flat = np.argsort(-sizes.ravel(), kind="stable")[:MOST_CELLS]
-    flat = flat[sizes.ravel()[flat] >= LEAST_CHANGE]
+    flat = flat[sizes.ravel()[flat] > 0]
     if len(flat) < CELLS:
         return None
     rows, columns = np.unravel_index(flat, sizes.shape)
@@ -258,11 +221,8 @@ def usual_change(moment: int, changes: Change, later: Change) -> Usual | None:
 def _usual_changes(found: Counterparts, row: int, states: Mapping[int, States]) -> list[Usual]:
     usual, reference = [], states[found.references[row]]
     for moment in range(0, len(reference), STRIDE):
-        changes = [_change(own, found, row, k, moment) for k, own in states.items()]
-        later = [
-            change_at(own, *_around(found, row, k, moment, LATER * REACH))
-            for k, own in states.items()
-        ]
+        changes = [change_about(own, found, row, k, moment) for k, own in states.items()]
+        later = [later_about(own, found, row, k, moment) for k, own in states.items()]
         known = usual_change(moment, np.stack(changes), np.stack(later))
         if known is not None:
             places = reference[:, known.rows, known.columns]
@@ -280,8 +240,8 @@ def _amounts(usual: Usual, own: States, found: Counterparts, row: int, d: int) -
     """
     if not _leads_back(found, row, d, usual.moment):
         return np.full(len(usual.rows), np.nan, dtype=np.float32)
-    at = _place(found, row, d, usual.moment)
-    before, after = _around(found, row, d, usual.moment, LATER * REACH)
+    at = place_of(found, row, d, usual.moment)
+    before, after = around(found, row, d, usual.moment, LATER * REACH)
     spans = [(b, a) for b in (at - REACH, before) for a in (at + REACH, after)]
     return np.asarray(np.max([usual.amounts(change_at(own, *span)) for span in spans], axis=0))
 
@@ -291,18 +251,6 @@ def _leads_back(found: Counterparts, row: int, d: int, moment: int) -> bool:
     if there is None or back is None:
         return True
     return bool(abs(back.at[there.at[moment]] - moment) <= DOUBTFUL)
-
-
-def _change(own: States, found: Counterparts, row: int, d: int, moment: int) -> Change:
-    at = _place(found, row, d, moment)
-    return change_at(own, at - REACH, at + REACH)
-
-
-def _around(found: Counterparts, row: int, d: int, moment: int, reach: int) -> tuple[int, int]:
-    """Return the counterparts in d of the moments `reach` before and after one of the reference."""
-    last = found.lengths[found.references[row]] - 1
-    before, after = max(moment - reach, 0), min(moment + reach, last)
-    return _place(found, row, d, before), _place(found, row, d, after)
 
 
 def _share_lacking(amounts: Amounts, trusted: Flags) -> Array:
@@ -343,18 +291,13 @@ def _lacking(
             continue
         values.append(float(np.sort(lack[:, d])[-MOMENTS:].mean()))
         moment = view.usual[int(lack[:, d].argmax())].moment
-        at = _place(found, view.row, d, moment)
+        at = place_of(found, view.row, d, moment)
         places.append((_about(found, d, at), _about(found, r, moment)))
     if not values:
         nowhere = Stretch(d, 0, found.lengths[d])
         return 0.0, nowhere, nowhere
     chosen = int(np.argsort(values, kind="stable")[len(values) // 2])
     return float(np.median(values)), *places[chosen]
-
-
-def _place(found: Counterparts, row: int, d: int, moment: int) -> int:
-    match = found.there[row][d]
-    return moment if match is None else int(match.at[moment])
 
 
 def _about(found: Counterparts, video: int, moment: int) -> Stretch:

@@ -1,21 +1,25 @@
-"""How far one picture is shifted against another: no camera stands where another stood."""
+"""How far what changes in one picture lies from what changes in another.
 
-from typing import NamedTuple
+No camera stands where another stood, and things do not lie where they lay. Light, colours and what
+else is in the picture may differ altogether, so that pictures cannot be laid over each other; what
+the same steps change can.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Picture = NDArray[np.float32]
-"""(..., H, W, 3) cells, 0..255."""
-
-FARTHEST = 5
+FARTHEST = 8
 """Farthest shift that is looked for [cells]."""
-SATURATED = 60.0
-"""Difference of two cells, summed over colours, beyond which they are merely different: things that
-lie elsewhere must not outweigh the rest."""
+SATURATED = 40.0
+"""Change of a cell beyond which it counts no more, 0..255."""
 BETTER = 0.8
-"""Share of the mean difference without a shift that is left at most, or there is none. Pictures of
-a camera that stood still differ by their lights and things, which no shift mends."""
+"""Share of the overlap that is there without a shift at most, or there is none: where each thing
+lies elsewhere, no shift mends it."""
+LEAST_GAIN = 4 * 12.0**2
+"""Least overlap that a shift brings: that of one thing, `effects.CELLS` cells of
+`changes.LEAST_CHANGE`."""
 
 
 class Offset(NamedTuple):
@@ -27,23 +31,28 @@ class Offset(NamedTuple):
     """Columns by which things lie more to the right."""
 
 
-def offset_between(one: Picture, other: Picture) -> Offset:
-    """Return how far `other` is shifted against `one`, both (H, W, 3).
+def offset_between(one: NDArray[np.floating[Any]], other: NDArray[np.floating[Any]]) -> Offset:
+    """Return how far the changes of `other` lie from those of `one`.
 
-    Small pictures, of less than three times FARTHEST in a direction, have no offset.
+    It is the shift with the largest overlap, the sum over moments and cells of the products.
+
+    Args:
+        one: (T, H, W) how much each cell changes at each moment, 0..255.
+        other: (T, H, W) the same of the other video, at the counterparts of the moments.
     """
-    height, width = one.shape[:2]
-    if min(height, width) < 3 * FARTHEST:
+    size = (one.shape[1] + FARTHEST, one.shape[2] + FARTHEST)
+    here, there = (np.fft.rfft2(np.minimum(each, SATURATED), size) for each in (one, other))
+    overlaps = np.fft.irfft2((np.conj(here) * there).sum(axis=0), size)
+    reach = np.arange(-FARTHEST, FARTHEST + 1)
+    near = overlaps[np.ix_(reach % size[0], reach % size[1])]
+    down, right = np.unravel_index(near.argmax(), near.shape)
+    without, best = near[FARTHEST, FARTHEST], near[down, right]
+    if without >= BETTER * best or best - without < LEAST_GAIN:
         return Offset(0, 0)
-    inner = one[FARTHEST : height - FARTHEST, FARTHEST : width - FARTHEST]
-    reach = range(-FARTHEST, FARTHEST + 1)
-    offsets = [Offset(down, right) for down in reach for right in reach]
-    apart = {offset: _difference(inner, other, offset) for offset in offsets}
-    least = min(offsets, key=lambda offset: (apart[offset], abs(offset.down) + abs(offset.right)))
-    return least if apart[least] < BETTER * apart[Offset(0, 0)] else Offset(0, 0)
+    return Offset(int(reach[down]), int(reach[right]))
 
 
-def shifted_back(pictures: Picture, offset: Offset) -> Picture:
+def shifted_back(pictures: NDArray[np.float32], offset: Offset) -> NDArray[np.float32]:
     """Return pictures (..., H, W, 3) as they are without the offset, continued at the edges."""
     if offset == (0, 0):
         return pictures
@@ -51,12 +60,3 @@ def shifted_back(pictures: Picture, offset: Offset) -> Picture:
     rows = np.clip(np.arange(height) + offset.down, 0, height - 1)
     columns = np.clip(np.arange(width) + offset.right, 0, width - 1)
     return np.asarray(pictures[..., rows[:, None], columns, :])
-
-
-def _difference(inner: Picture, other: Picture, offset: Offset) -> float:
-    """Return the mean difference of the inner part of a picture and the part at an offset."""
-    height, width = inner.shape[:2]
-    top, left = FARTHEST + offset.down, FARTHEST + offset.right
-    there = other[top : top + height, left : left + width]
-    apart = np.abs(inner - there).sum(axis=-1)
-    return float(np.minimum(apart, SATURATED).mean())

@@ -14,7 +14,7 @@ from filtering.moments.counterparts import (
     find_match,
     recurring,
 )
-from filtering.moments.decision import KINDS, Observed, exceedances, judge
+from filtering.moments.decision import KINDS, UNLIKE, Observed, exceedances, judge
 from filtering.moments.evidence import kinds
 from filtering.moments.evidence.effects import states_of, usual_change
 from filtering.moments.evidence.orders import variety_of
@@ -271,9 +271,26 @@ def test_an_evidence_is_measured_against_its_pool():
     for kind in KINDS:
         found = exceedances(kind, observed(values), everybody)
         assert found.argmax() == 4
-        assert np.allclose(found, exceedances(kind, observed(values + 3), everybody))
+        assert np.allclose(found, exceedances(kind, observed(values - 3), everybody))
         free = exceedances(kind, observed(values, variety=0.3), everybody)
         assert 0 < free[4] < found[4]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_where_videos_are_found_badly_in_each_other_missing_and_extra_moments_count_less(kind):
+    values = np.array([0.1, 0.2, 0.15, 0.12, 0.9])
+    trusted = np.array([True, True, True, True, False])
+    pool = observed(values)
+    found = exceedances(kind, pool, trusted)
+    for level in (0.3, UNLIKE):  # as far as it is usual
+        seen = pool._replace(values={**pool.values, "extra": values - values[2] + level})
+        assert np.allclose(exceedances(kind, seen, trusted), found)
+    unlike = pool._replace(values={**pool.values, "extra": values + 2 * UNLIKE})
+    less = exceedances(kind, unlike, trusted)[4]
+    assert less < found[4] if kind in ("missing", "extra") else less == found[4]
+    distrusted = pool._replace(values={**pool.values, "extra": np.where(trusted, values, 50.0)})
+    if kind != "extra":
+        assert np.array_equal(exceedances(kind, distrusted, trusted), found)
 
 
 def test_an_evidence_is_measured_against_the_trusted_alone():
