@@ -61,7 +61,7 @@ the random look: it costs least, by two for a miss and one for a false alarm."""
 UNLIKE = 0.5
 """Median evidence of extra moments among the trusted up to which videos are found well in each
 other: it is 0.4 or less in the scenes TUNED_ON and in one camera's view of the tea table, but 0.9
-to 1.5 close to the cup under the random look, where correct videos were accused of it."""
+to 2 close to the cup, where under the random look correct videos were accused of it."""
 FEWER = 0.45
 """How much less than the usual share of the others, the median of the trusted, must keep the same
 order as a demonstration. Among ten of one order and three of another, those of the scenes TUNED_ON
