@@ -22,6 +22,8 @@ LASTING_SHARE = 0.5
 effect."""
 LEAST_CHANGE = 12.0
 """Least change of a cell that counts, 0..255."""
+CELLS = 4
+"""Least number of cells that change: a thing fills as many."""
 STILL = 2
 """Moments on each side over which the median is taken."""
 BLUR = 0.7

@@ -32,6 +32,7 @@ from scipy.ndimage import maximum_filter1d
 
 from filtering.moments.counterparts import Counterparts, how_far
 from filtering.moments.evidence.changes import (
+    CELLS,
     LATER,
     REACH,
     Change,
@@ -45,7 +46,7 @@ from filtering.moments.evidence.changes import (
     states_of,
 )
 from filtering.moments.evidence.recurring import recurrences
-from filtering.moments.evidence.stretches import Evidence, Stretch
+from filtering.moments.evidence.stretches import Evidence, Stretch, mean_of_largest
 from filtering.moments.evidence.usual import usual_of_others
 from filtering.moments.evidence.viewpoints import Viewpoint
 from filtering.moments.peers.colours import actors_of
@@ -71,8 +72,6 @@ LEAST_SHARE = 0.1
 """Least share of a change that is told apart from none."""
 MOST_CELLS = 300
 """Most cells looked at at a moment, those that change most."""
-CELLS = 4
-"""Least number of cells that change: a thing fills as many."""
 CELLS_SHARE = 0.25
 """Share of the cells that change, CELLS or more, whose mean counts, those that lack most."""
 OTHER_COLOUR = 0.4
@@ -289,7 +288,7 @@ def _lacking(
         r = found.references[view.row]
         if r == d:
             continue
-        values.append(float(np.sort(lack[:, d])[-MOMENTS:].mean()))
+        values.append(mean_of_largest(lack[:, d], MOMENTS))
         moment = view.usual[int(lack[:, d].argmax())].moment
         at = place_of(found, view.row, d, moment)
         places.append((_about(found, d, at), _about(found, r, moment)))

@@ -10,16 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from filtering.moments.evidence.changes import CELLS, LEAST_CHANGE
+
 FARTHEST = 8
-"""Farthest shift that is looked for [cells]."""
+"""Farthest shift that is looked for [cells]. Under the random look the cup lies up to 7 cells
+elsewhere, in the bank of tea-making that this was made on."""
 SATURATED = 40.0
-"""Change of a cell beyond which it counts no more, 0..255."""
+"""Most that the change of a cell counts, 0..255; set by hand."""
 BETTER = 0.8
-"""Share of the overlap that is there without a shift at most, or there is none: where each thing
-lies elsewhere, no shift mends it."""
-LEAST_GAIN = 4 * 12.0**2
-"""Least overlap that a shift brings: that of one thing, `effects.CELLS` cells of
-`changes.LEAST_CHANGE`."""
+"""A shift is taken only if the overlap without it is less than this share of the overlap with it:
+where each thing lies elsewhere, no shift brings them together. Set by hand."""
+LEAST_GAIN = CELLS * LEAST_CHANGE**2
+"""Least overlap that a shift must bring: that of the least change of one thing."""
 
 
 class Offset(NamedTuple):

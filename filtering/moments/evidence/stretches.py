@@ -41,12 +41,12 @@ class Evidence:
 
 def worst(curve: NDArray[np.floating]) -> float:
     """Return the mean of the largest twelfth of a curve (n,), of 3 values or more."""
-    return _mean_of_largest(curve, max(3, len(curve) // WORST))
+    return mean_of_largest(curve, max(3, len(curve) // WORST))
 
 
 def brief(curve: NDArray[np.floating]) -> float:
     """Return the mean of the BRIEF largest values of a curve (n,), of all where it has fewer."""
-    return _mean_of_largest(curve, BRIEF)
+    return mean_of_largest(curve, BRIEF)
 
 
 def peak(curve: NDArray[np.floating]) -> tuple[int, int]:
@@ -64,8 +64,8 @@ def peak(curve: NDArray[np.floating]) -> tuple[int, int]:
     return start, stop
 
 
-def _mean_of_largest(curve: NDArray[np.floating], count: int) -> float:
-    """Return the mean of the `count` largest values of a curve, of all where it has fewer."""
+def mean_of_largest(curve: NDArray[np.floating], count: int) -> float:
+    """Return the mean of the `count` largest values of a curve (n,), of all where it has fewer."""
     return float(np.sort(curve)[-count:].mean())
 
 
