@@ -5,6 +5,7 @@ import pytest
 
 from filtering.moments.evidence.offsets import (
     FARTHEST,
+    LEAST_GAIN,
     SATURATED,
     Offset,
     offset_between,
@@ -60,6 +61,13 @@ def test_where_nothing_changes_there_is_no_shift():
     assert offset_between(changes(*SOME), changes()) == (0, 0)
     never_at_once = changes(*SOME), changes(*SOME)[::-1]
     assert offset_between(*never_at_once) == (0, 0)
+
+
+@pytest.mark.parametrize(("size", "shift"), [(1, (0, 0)), (2, (4, 0))])
+def test_less_than_the_least_change_of_one_thing_is_no_shift(size, shift):
+    one, other = (changes(place, size=size, amount=20.0) for place in (SOME[0], elsewhere(4, 0)[0]))
+    assert (one * one).sum() < LEAST_GAIN if size == 1 else (one * one).sum() > LEAST_GAIN
+    assert offset_between(one, other) == shift
 
 
 def test_one_large_change_does_not_outweigh_the_others():
