@@ -21,6 +21,7 @@ NATURES = {
     "missing": "steps left out",
     "ineffective": "steps left out",
     "extra": "extra steps",
+    "unexpected": "extra steps",
 }
 """Group of a demonstration by the gravest kind of evidence against it."""
 MOST_NAMED = 8
@@ -149,6 +150,8 @@ def reason(finding: MomentFinding, counts: Sequence[int], timeline: Timeline) ->
         return f"{_capital(seen)} came at an unusual place ({clock.during(own)})."
     if finding.kind == "extra":
         return f"What is seen at {clock.during(own)} is in few other videos."
+    if finding.kind == "unexpected":
+        return f"What changes in the picture at {clock.during(own)} changes in few other videos."
     return f"{_capital(seen)} was carried out ({clock.during(own)}), but without its usual effect."
 
 
@@ -161,7 +164,7 @@ def _finding(one: MomentFinding, counts: Sequence[int], timeline: Timeline) -> F
     own = timeline.span(one.own, counts[one.own.video])
     named = timeline.what(one.other, counts[one.other.video])
     return Finding(
-        expected=None if one.kind == "extra" else named,
+        expected=None if one.kind in ("extra", "unexpected") else named,
         seen=None if one.kind == "missing" else own.subtask,
         after=None,
         frame=own.start,

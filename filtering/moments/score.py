@@ -19,7 +19,9 @@ from filtering.moments.decision import (
     strengths_of,
     telling,
 )
-from filtering.moments.evidence.effects import Effects, ineffective, observe
+from filtering.moments.effects.lacking import ineffective
+from filtering.moments.effects.observed import Effects, observe
+from filtering.moments.effects.unexpected import unexpected
 from filtering.moments.evidence.kinds import missing_order_extra
 from filtering.moments.evidence.orders import kept_orders, moves_between, variety_of
 from filtering.moments.evidence.strange import Strange, strange_in
@@ -171,6 +173,7 @@ def gather(
     kinds = (
         *missing_order_extra(alike, references, strange),
         ineffective(found, effects.views, same_actor),
+        unexpected(effects.unexpected),
     )
     return dict(zip(KINDS, kinds, strict=True))
 

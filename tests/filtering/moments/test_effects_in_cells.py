@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 
 from filtering.moments.counterparts import compare
-from filtering.moments.evidence.effects import (
-    DOUBTFUL,
-    OTHER_COLOUR,
-    View,
-    observe,
-    usual_change,
-)
-from filtering.moments.evidence.recurring import recurrences
+from filtering.moments.effects.lacking import DOUBTFUL, View
+from filtering.moments.effects.observed import observe
+from filtering.moments.effects.recurring import recurrences
+from filtering.moments.effects.usual_changes import OTHER_COLOUR, usual_change
 from filtering.moments.peers.peers import everybody
 from tests.filtering.moments.toy_videos import HEIGHT, STEPS, toy_video
 
@@ -127,10 +123,10 @@ def test_it_is_doubtful_what_a_video_shows_whose_counterparts_do_not_lead_back()
     found = compare([video.looks for video in videos], range(5))
     astray = tuple(
         tuple(
-            match._replace(at=match.at + 2 * DOUBTFUL) if match and d == 1 else match
+            match._replace(at=(match.at + 2 * DOUBTFUL) % length) if match and d == 1 else match
             for d, match in enumerate(row)
         )
-        for row in found.back
+        for row, length in zip(found.back, found.lengths, strict=True)
     )
     for view in observe(replace(found, back=astray), videos).views:
         for amounts in view.amounts:

@@ -15,8 +15,9 @@ from filtering.moments.counterparts import (
     recurring,
 )
 from filtering.moments.decision import KINDS, UNLIKE, Observed, exceedances, judge
+from filtering.moments.effects.changes import states_of
+from filtering.moments.effects.usual_changes import usual_change
 from filtering.moments.evidence import kinds
-from filtering.moments.evidence.effects import states_of, usual_change
 from filtering.moments.evidence.orders import variety_of
 from filtering.moments.evidence.replaced import Side, replaced
 from filtering.moments.evidence.stretches import BRIEF, brief, peak, worst

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from filtering.moments.evidence.offsets import (
+from filtering.moments.effects.offsets import (
     FARTHEST,
     LEAST_GAIN,
     SATURATED,

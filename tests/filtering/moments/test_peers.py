@@ -6,9 +6,11 @@ import pytest
 from filtering.judging.moments import told_of_actors, told_of_looks
 from filtering.moments import score
 from filtering.moments.counterparts import compare
-from filtering.moments.evidence.effects import Effects
+from filtering.moments.effects.observed import Effects
+from filtering.moments.effects.unexpected import Unexpected
 from filtering.moments.evidence.kinds import missing_order_extra
 from filtering.moments.evidence.strange import strange_in
+from filtering.moments.evidence.stretches import Stretch
 from filtering.moments.evidence.usual import Reference, references_of
 from filtering.moments.peers.peers import Peers, everybody, looks_of
 from filtering.moments.score import gather, score_moments
@@ -94,7 +96,9 @@ def test_an_order_is_judged_among_all_and_the_rest_among_the_same_actor():
     alike = references_of(found, everyone.told_apart(actors))
     among_all = missing_order_extra(references, references, strange)
     by_actor = missing_order_extra(alike, alike, strange)
-    gathered = gather(found, references, strange, Effects((), actors), everyone)
+    nowhere = Stretch(0, 0, 1)
+    effects = Effects((), (Unexpected(0.0, nowhere, nowhere),) * len(videos), actors)
+    gathered = gather(found, references, strange, effects, everyone)
     for kind, same, whole in zip(("missing", "order", "extra"), by_actor, among_all, strict=True):
         expected = whole if kind == "order" else same
         assert (same.values != whole.values).any()

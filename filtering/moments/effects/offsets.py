@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from filtering.moments.evidence.changes import CELLS, LEAST_CHANGE
+from filtering.moments.effects.changes import CELLS, LEAST_CHANGE
 
 FARTHEST = 8
 """Farthest shift that is looked for [cells]. Under the random look the cup lies up to 7 cells

@@ -4,14 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts
-from filtering.moments.evidence.changes import (
+from filtering.moments.effects.changes import (
     LEAST_CHANGE,
     States,
     change_about,
     lasting_sizes,
     later_about,
 )
-from filtering.moments.evidence.offsets import offset_between, shifted_back
+from filtering.moments.effects.offsets import offset_between, shifted_back
 
 STRIDE = 4
 """Every fourth moment is looked at for what changes where."""

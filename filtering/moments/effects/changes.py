@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts
+from filtering.moments.evidence.stretches import Stretch
 from filtering.moments.vectors import Video
 
 Change = NDArray[np.float32]
@@ -88,3 +89,8 @@ def lasting_sizes(change: NDArray[np.floating[Any]], later: Change) -> NDArray[n
     sizes = np.linalg.norm(change, axis=-1)
     lasts = (change * later).sum(axis=-1) >= LASTING_SHARE * np.square(sizes)
     return np.where(lasts & (sizes >= LEAST_CHANGE), sizes, 0.0)
+
+
+def stretch_about(found: Counterparts, video: int, moment: int) -> Stretch:
+    """Return the stretch of a video before and after a moment in which a change comes about."""
+    return Stretch(video, max(moment - REACH, 0), min(moment + REACH + 1, found.lengths[video]))

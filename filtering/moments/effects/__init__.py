@@ -1,0 +1,1 @@
+"""What changes in the picture for good, and what of it others do not show."""
