@@ -12,10 +12,10 @@ u is 1 but for missing and extra moments where even usual videos are found badly
 by a camera close to one thing that looks different in every video: there the median of the evidence
 of extra moments is larger than UNLIKE, and u is larger than 1 by the difference.
 
-A picture that changes in another way than others is a small thing where the camera stands close: a
-tea bag falls to the other side. An unexpected change therefore counts UNEXPECTED times as much as
-the extra moments of the same demonstration at most: whoever does something else moves otherwise,
-too.
+Where a camera stands close, correct demonstrations change its picture in different ways: a tea bag
+falls to the other side of the cup. An unexpected change therefore counts at most UNEXPECTED times
+as much as the extra moments of the same demonstration: who does something else also moves in
+another way.
 
 Where a short step is moved, few moments pass each other, though they do so in nearly all pairs of
 videos. Evidence of order therefore counts more if a demonstration keeps the order of fewer others
