@@ -51,7 +51,7 @@ Chosen with FREE and SCATTER on two or three pools of every kind of each scene T
 twenty of tea-making, as a compromise between mistakes found and correct videos accused
 (`scripts/check_scenes.py`); those of missing and extra once more since BRIEF moments count, on
 eight of the scenes and two banks of tea-making, by two for a miss and one for a false alarm, and of
-those that cost the same the one that accuses fewest."""
+those that cost the same the one that accuses fewest. For unexpected changes see UNEXPECTED."""
 FREE: Mapping[str, float] = MappingProxyType(
     {"missing": 2.0, "order": 6.0, "extra": 2.0, "ineffective": 9.0, "unexpected": 2.0}
 )

@@ -68,9 +68,13 @@ def later_about(own: States, found: Counterparts, row: int, d: int, moment: int)
 
 def around(found: Counterparts, row: int, d: int, moment: int, reach: int) -> tuple[int, int]:
     """Return the counterparts in d of the moments `reach` before and after one of the reference."""
-    last = found.lengths[found.references[row]] - 1
-    before, after = max(moment - reach, 0), min(moment + reach, last)
+    before, after = ends_about(moment, reach, found.lengths[found.references[row]])
     return place_of(found, row, d, before), place_of(found, row, d, after)
+
+
+def ends_about(moment: int, reach: int, length: int) -> tuple[int, int]:
+    """Return the moments `reach` before and after one of a video, or its first and last ones."""
+    return max(moment - reach, 0), min(moment + reach, length - 1)
 
 
 def place_of(found: Counterparts, row: int, d: int, moment: int) -> int:
@@ -93,4 +97,5 @@ def lasting_sizes(change: NDArray[np.floating[Any]], later: Change) -> NDArray[n
 
 def stretch_about(found: Counterparts, video: int, moment: int) -> Stretch:
     """Return the stretch of a video before and after a moment in which a change comes about."""
-    return Stretch(video, max(moment - REACH, 0), min(moment + REACH + 1, found.lengths[video]))
+    before, after = ends_about(moment, REACH, found.lengths[video])
+    return Stretch(video, before, after + 1)

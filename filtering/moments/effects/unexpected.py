@@ -13,21 +13,32 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from filtering.moments.counterparts import Counterparts, Match, spread
-from filtering.moments.effects.changes import LATER, REACH, States, change_at, stretch_about
+from filtering.moments.effects.changes import (
+    LATER,
+    REACH,
+    States,
+    change_at,
+    ends_about,
+    stretch_about,
+)
 from filtering.moments.effects.usual_changes import MOMENTS, Usual, share_lacking, usual_change
 from filtering.moments.evidence.strange import SHARED
 from filtering.moments.evidence.stretches import Evidence, Stretch, mean_of_largest
 from filtering.moments.evidence.usual import FEWEST
 from filtering.moments.peers.peers import Looks
 
+Array = NDArray[np.float64]
+
 MOST_CELLS = 100
-"""Most cells looked at at a moment, those that change most."""
+"""Most cells looked at at a moment, those that change most, so that it takes little time."""
 STRIDE = 4
-"""Every fourth moment is looked at."""
+"""Every fourth moment is looked at: a change is seen from REACH moments before to as many after."""
 MOST_COMPARED = 12
-"""Most references that a demonstration is compared with."""
+"""Most references that a demonstration is compared with, about those of a small pool: each takes
+time."""
 
 
 class Unexpected(NamedTuple):
@@ -67,7 +78,7 @@ def unexpected_in(
         return Unexpected(0.0, nowhere, nowhere)
     matches = [_match(found, row, d) for row in rows]
     others = [placed[found.references[row]] for row in rows]
-    shares = np.array([_lacked(change, own, matches, others) for change in changes])
+    shares = np.stack([_lacked(change, own, matches, others) for change in changes])
     lacking = np.quantile(shares, SHARED, axis=1)
     chosen = int(lacking.argmax())
     moment, without = changes[chosen].moment, int(shares[chosen].argmax())
@@ -92,23 +103,22 @@ def _changes_of(own: States) -> Iterator[Usual]:
 
 def _lacked(
     change: Usual, own: States, matches: Sequence[Match], others: Sequence[States]
-) -> list[float]:
-    """Return the share of a change of a video that each of the others lacks."""
+) -> Array:
+    """Return (K,): the share of a change of a video that each of K others lacks."""
     moment = change.moment
     usual = change.amounts(change_at(own, moment - REACH, moment + REACH))
     amounts = [
         change.most(states, _spans(match, moment))
         for match, states in zip(matches, others, strict=True)
     ]
-    return [float(share) for share in share_lacking(np.stack(amounts), usual)]
+    return share_lacking(np.stack(amounts), usual)
 
 
 def _spans(match: Match, moment: int) -> Iterator[tuple[int, int]]:
     """Yield the spans in which the same change may come about in another video."""
     for at in {int(match.at[moment]), int(match.nearest[moment])}:
         yield at - REACH, at + REACH
-    last = len(match.at) - 1
-    before, after = max(moment - LATER * REACH, 0), min(moment + LATER * REACH, last)
+    before, after = ends_about(moment, LATER * REACH, len(match.at))
     yield int(match.at[before]), int(match.at[after])
 
 

@@ -40,6 +40,17 @@ def test_a_change_into_another_colour_counts_in_part():
     assert there == pytest.approx(np.full(48, OTHER_COLOUR * size), rel=1e-4)
 
 
+@pytest.mark.parametrize(("columns", "share"), [(1, OTHER_COLOUR), (2, 0.0)])
+def test_another_colour_counts_in_the_next_cells_alone(columns, share):
+    usual = usual_of(as_usual(HAND)).but(np.arange(48) % 8 != 0)
+    assert usual is not None
+    assert usual.columns.tolist() == [0] * 6
+    dark = as_usual(np.subtract(TABLE, 60.0))
+    size = np.linalg.norm(dark[0, 0])
+    dark[:, np.arange(8) != columns] = 0.0
+    assert usual.amounts(dark) == pytest.approx(np.full(6, share * size), rel=1e-4)
+
+
 def test_nothing_of_a_change_is_there_where_nothing_changes():
     assert not usual_of(as_usual(CUP)).amounts(np.zeros((6, 8, 3), np.float32)).any()
 

@@ -66,6 +66,16 @@ def test_a_video_in_which_nothing_changes_lacks_nothing():
     assert (found.own.start, found.own.stop) == (0, len(still))
 
 
+@pytest.mark.parametrize(("times", "counts"), [(1, True), (4, False)])
+def test_a_hand_that_comes_back_to_rest_is_no_unexpected_change(times, counts):
+    videos = usual_videos(8, tempo=4.0)
+    cells = videos[7].cells.copy()
+    for start in range(25, 25 + 50 * times, 50):
+        cells[start : start + 25, 12:16, :12] = (220, 180, 150)
+    value = lacking_of([*videos[:7], Video(videos[7].looks, cells)], 7).value
+    assert value > 0.7 if counts else value < 0.3
+
+
 def test_nobody_is_accused_where_things_lie_elsewhere_in_every_video():
     videos = [elsewhere(video, 3 * d) for d, video in enumerate(usual_videos(8))]
     assert not score_moments({"front": videos}).flagged.any()
